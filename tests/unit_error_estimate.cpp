@@ -354,8 +354,8 @@ TEST_CASE("an image that has met few of its scene's brightest paths does not kno
     CHECK_FALSE(estimateError(quiet, PixelSet::All, {.brightest = {500, true}})->known());
 }
 
-// The share of paths that is brighter than y falls off as y^-3.2: variances have a mean, and their scatter has
-// none. Without what the interval adds for pixels that were not met, 86 % would hold.
+// The share of paths that is brighter than y falls off as y^-3.2: variances have a mean, and their scatter
+// has none. Without what the interval adds for pixels that were not met, 86 % would hold.
 TEST_CASE("intervals contain what was not met", "[error]") {
     constexpr u32 kSide = 32;
     constexpr u64 kSamples = 16;
