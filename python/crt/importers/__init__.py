@@ -6,6 +6,7 @@ import pathlib
 
 from ..errors import Error, Kind
 from ..scenes import Scene, scene
+from .losses import reading, refuse_infinite
 from .writer import relative
 
 ENDINGS = (".xml", ".pbrt", ".pbrt.gz")
@@ -43,7 +44,9 @@ def import_scene(path, parameters=None):
         from . import mitsuba as reader
     else:
         from . import pbrt as reader
-    made = reader.read(path, {str(k): str(v) for k, v in (parameters or {}).items()})
-    content = made.content()
+    with reading(path):
+        made = reader.read(path, {str(k): str(v) for k, v in (parameters or {}).items()})
+        content = made.content()
+        refuse_infinite(content)
     beside = relative(content, path.parent)
     return Imported(scene(beside, directory=path.parent, name=path.name), content, made.losses.list())

@@ -2,6 +2,7 @@
 paths."""
 
 import dataclasses
+import pickle
 import re
 
 import numpy as np
@@ -50,8 +51,8 @@ class Draft:
         base = re.sub(r"[^A-Za-z0-9_.-]+", "_", wanted or content["type"]).strip("_")
         if not base[:1].isalpha() or base.lower() in NO_NAMES:
             base = f"material_{base}".rstrip("_")
-        # The content as text finds in one step whether the material is there under another number.
-        key = (base, repr(content))
+        # The content as bytes finds in one step whether the material is there under another number.
+        key = (base, pickle.dumps(content))
         if key not in self.material_names:
             name, number = base, self.next_numbers.get(base, 2)
             while name in self.materials:

@@ -1,7 +1,12 @@
 """Where things stand in the files of other programs, what an import leaves out, and how it refuses."""
 
+import contextlib
+import contextvars
 import dataclasses
 import difflib
+import re
+
+import numpy as np
 
 from ..errors import Error, Kind
 
@@ -27,8 +32,79 @@ def present(path, place):
 
 def refuse(place, sentence):
     """Raises crt.Error of kind SCENE that begins with file, line and column."""
-    raise Error(f"{place.file}:{place.line}:{place.column}: error: {sentence}", Kind.SCENE, place.file,
-                place.line, place.column)
+    raise Error(f"{place.file}:{place.line}:{place.column}: error: {printable(sentence)}", Kind.SCENE,
+                place.file, place.line, place.column)
+
+
+MOST_STEPS, FILE_COST = 200_000, 20
+
+
+class _Reading:
+    """What an import is at: `place`, and how many steps it has taken."""
+
+    def __init__(self, place):
+        self.place, self.steps = place, 0
+
+
+_reading = contextvars.ContextVar("crt_importers_reading", default=None)
+
+
+def at(place):
+    """Remembers where the import is, for errors that know no place."""
+    reading = _reading.get()
+    if reading is not None:
+        reading.place = place
+
+
+def step(place, cost=1):
+    """Counts a material or a texture that is looked at, or, at a higher cost, a file. Raises crt.Error at
+    `place` when there are too many: things that name the next twice double at each step, and a few lines
+    would never end."""
+    at(place)
+    reading = _reading.get()
+    if reading is None:
+        return
+    reading.steps += cost
+    if reading.steps > MOST_STEPS:
+        refuse(place, "this is looked at as the part of something else, again and again: more than "
+                      f"{MOST_STEPS:,} materials and textures, or {MOST_STEPS // FILE_COST:,} files")
+
+
+@contextlib.contextmanager
+def reading(path):
+    """Within it whatever goes wrong is a crt.Error of kind SCENE with file, line and column."""
+    token = _reading.set(_Reading(Place(str(path), 1)))
+    try:
+        with np.errstate(all="ignore"):  # What is not finite is refused in the end.
+            yield
+    except Error:
+        raise
+    except RecursionError:
+        refuse(_reading.get().place, "things are within one another too deep")
+    except MemoryError:
+        refuse(_reading.get().place, "there is not enough memory for what is named here")
+    except Exception as error:
+        words = f"{type(error).__name__}: {error}"
+        refuse(_reading.get().place, f"this cannot be read: {printable(words)[:300]}")
+    finally:
+        _reading.reset(token)
+
+
+def refuse_infinite(content, name="the scene"):
+    """Raises crt.Error for a number or an array of a scene's content that is not finite."""
+    if isinstance(content, dict):
+        for key, inner in content.items():
+            refuse_infinite(inner, f"'{key}' of {name}" if name.count("' of ") < 3 else name)
+    elif isinstance(content, list):
+        for inner in content:
+            refuse_infinite(inner, name)
+    elif isinstance(content, (float, np.ndarray)) and not np.isfinite(content).all():
+        refuse(_reading.get().place, f"{name} is not finite")
+
+
+def printable(text):
+    """Control characters as \\xNN: names come from files, and go to terminals."""
+    return re.sub(r"[\x00-\x08\x0a-\x1f\x7f-\x9f]", lambda found: f"\\x{ord(found[0]):02x}", text)
 
 
 def suggestion(name, known):
@@ -49,7 +125,7 @@ class Loss:
 
     def __str__(self):
         times = f" ({self.count} times)" if self.count > 1 else ""
-        return f"{self.first}: {self.what}{times}: {self.instead}"
+        return printable(f"{self.first}: {self.what}{times}: {self.instead}")
 
 
 class Losses:

@@ -1,7 +1,6 @@
 """Files of meshes that crt does not read as they are: PLY to be turned inside out, PLY within gzip, and
 Mitsuba's serialized meshes."""
 
-import gzip
 import struct
 import zlib
 
@@ -17,15 +16,40 @@ class Damaged(Exception):
     """A file is not what it should be."""
 
 
+# Packed files may be this much larger unpacked: meshes and scenes are 3 to 30 times as large.
+UNPACKED_LEAST, UNPACKED_RATIO = 64_000_000, 200
+
+
 def read_bytes(path):
     """The file's contents, unpacked where it is a gzip file. Raises OSError or Damaged."""
+    if not path.is_file():
+        raise Damaged("it is no file")
     data = path.read_bytes()
     if data[:2] != b"\x1f\x8b":
         return data
+    made, most = [], UNPACKED_LEAST + UNPACKED_RATIO * len(data)
+    while data:  # A gzip file may have several members, and zeros behind them.
+        part, data = unpacked(data, 16 + zlib.MAX_WBITS, most)
+        made.append(part)
+        most -= len(part)
+        data = data.lstrip(b"\0")
+    return b"".join(made)
+
+
+def unpacked(data, form, most=None):
+    """One stream of zlib's (`form` as zlib.decompressobj has it), and what is behind it. Raises Damaged."""
+    if most is None:
+        most = UNPACKED_LEAST + UNPACKED_RATIO * len(data)
+    stream = zlib.decompressobj(form)
     try:
-        return gzip.decompress(data)
-    except (EOFError, OSError, zlib.error) as error:
-        raise Damaged(f"it is no whole gzip file: {error}") from None
+        made = stream.decompress(data, most + 1)
+    except zlib.error as error:
+        raise Damaged(f"it is no whole packed file: {error}") from None
+    if len(made) > most:
+        raise Damaged(f"unpacked it is more than {most / 1e6:.0f} MB, {UNPACKED_RATIO} times its size")
+    if not stream.eof:
+        raise Damaged("it is no whole packed file: its end is missing")
+    return made, stream.unused_data
 
 
 def ply_header(data):
@@ -114,6 +138,8 @@ def lists(data, offset, words, order, count, properties):
             if counts:
                 size = int(np.frombuffer(data, order + counts, 1, offset)[0])
                 offset += np.dtype(counts).itemsize
+                if size < 0:
+                    raise Damaged(f"a list has {size} values")
             rows[name].append(np.frombuffer(data, order + form, size, offset).tolist())
             offset += np.dtype(form).itemsize * size
     return rows, offset
@@ -208,7 +234,7 @@ def indices(corner, rows):
 def read_serialized(path, index):
     """Mesh number `index` of a file of Mitsuba's serialized meshes (versions 3 and 4), and whether it says
     that its faces are flat. Raises OSError or Damaged."""
-    data = path.read_bytes()
+    data = read_bytes(path)
     try:
         mark, version = struct.unpack_from("<HH", data)
         count, = struct.unpack_from("<I", data, len(data) - 4)
@@ -219,7 +245,7 @@ def read_serialized(path, index):
         form = "<Q" if version == 4 else "<I"
         size = struct.calcsize(form)
         start, = struct.unpack_from(form, data, len(data) - 4 - size * (count - index))
-        return serialized_mesh(zlib.decompressobj().decompress(data[start + 4:]), version)
+        return serialized_mesh(unpacked(data[start + 4:], zlib.MAX_WBITS)[0], version)
     except (struct.error, zlib.error, ValueError) as error:
         raise Damaged(f"it is damaged: {error}") from None
 

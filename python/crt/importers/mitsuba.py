@@ -6,7 +6,7 @@ import numpy as np
 
 from . import matrices, shapes, sky_image, spectra
 from .images import pixels
-from .losses import present, refuse, suggestion
+from .losses import at, present, refuse, step, suggestion
 from .meshes import Damaged, faced, ply_vertex, read_obj, read_ply, read_serialized
 from .mitsuba_materials import Materials
 from .mitsuba_tree import Reader
@@ -191,6 +191,7 @@ class Importer:
     # Lights.
 
     def emitter(self, plugin):
+        at(plugin.place)
         make = getattr(self, "light_" + plugin.kind, None)
         if make is None:
             known = [name[6:] for name in dir(self) if name.startswith("light_")]
@@ -282,11 +283,13 @@ class Importer:
             return
         if plugin.kind == "merge":
             for part in plugin.all("shape"):
+                step(part.place)
                 self.shape(part)
             return
         self.thing(plugin, [matrices.identity()])
 
     def thing(self, plugin, placements, in_group=False):
+        at(plugin.place)
         make = getattr(self, "shape_" + plugin.kind, None)
         if make is None:
             known = [name[6:] for name in dir(self) if name.startswith("shape_")]

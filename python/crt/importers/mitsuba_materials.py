@@ -7,7 +7,7 @@ import numpy as np
 
 from . import spectra
 from .images import powered
-from .losses import suggestion
+from .losses import step, suggestion
 from .mitsuba_values import Values
 from .draft import BLACK
 
@@ -65,6 +65,7 @@ class Materials:
 
     def surface(self, plugin, values):
         """None: there is none (`null`)."""
+        step(plugin.place)
         make = getattr(self, "of_" + plugin.kind, None)
         if make is None:
             known = [name[3:] for name in dir(self) if name.startswith("of_")]

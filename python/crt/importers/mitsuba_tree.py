@@ -8,7 +8,7 @@ import xml.parsers.expat
 import numpy as np
 
 from . import matrices
-from .losses import Place, refuse, suggestion
+from .losses import FILE_COST, Place, at, refuse, step, suggestion
 
 PLUGINS = {"scene", "shape", "bsdf", "emitter", "texture", "sensor", "film", "sampler", "integrator",
            "medium", "phase", "rfilter", "volume", "subsurface"}
@@ -138,7 +138,7 @@ class Reader:
         self.fill(scene, root, [self.path.resolve()])
         for plugin, name, element in self.references:
             plugin.parts[plugin.parts.index((name, element))] = (name, self.named(element))
-        refuse_circles(scene, [])
+        refuse_circles(scene, [], set())
         return scene
 
     def root(self, path):
@@ -175,6 +175,7 @@ class Reader:
 
     def fill(self, plugin, element, trail):
         for child in element.children:
+            at(child.place)
             tag = OLDER.get(child.tag, child.tag)
             if tag in PLUGINS or (tag == "spectrum" and "type" in child.attributes):
                 self.plugin(plugin, child, "texture" if tag == "spectrum" else tag, trail)
@@ -235,6 +236,7 @@ class Reader:
         refuse(element.place, f"there is no '{name}'" + suggestion(name, known))
 
     def include(self, plugin, element, trail):
+        step(element.place, FILE_COST)
         path = self.file(element.place, self.attribute(element, "filename"))
         if not path.is_file():
             refuse(element.place, f"'{path}' is not there")
@@ -293,9 +295,11 @@ class Reader:
             kelvin = self.attribute(element, "temperature").strip().rstrip("kK")
             scale = self.floats(element, "scale", (1,), "1")[0]
             try:
-                return {"kelvin": float(kelvin), "scale": scale}
+                if 0 < float(kelvin) < np.inf:
+                    return {"kelvin": float(kelvin), "scale": scale}
             except ValueError:
-                refuse(element.place, f"a temperature is a number in kelvin, not '{kelvin}'")
+                pass
+            refuse(element.place, f"a temperature is a number in kelvin, not '{kelvin}'")
         if tag == "spectrum" and "filename" in element.attributes:
             return {"file": self.file(element.place, self.attribute(element, "filename")),
                     "place": element.place}
@@ -374,12 +378,15 @@ def place_folder(place):
     return pathlib.Path(place.file).parent
 
 
-def refuse_circles(plugin, within):
-    """A plugin that is a part of itself has no end."""
+def refuse_circles(plugin, within, without):
+    """A plugin that is a part of itself has no end. Those that are known to be none are `without`."""
     if any(plugin is outer for outer in within):
         refuse(plugin.place, f"{plugin} '{plugin.id}' is a part of itself")
+    if id(plugin) in without:
+        return
     for _, part in plugin.parts:
-        refuse_circles(part, [*within, plugin])
+        refuse_circles(part, [*within, plugin], without)
+    without.add(id(plugin))
 
 
 def upgrade(plugin):

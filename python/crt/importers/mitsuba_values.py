@@ -7,7 +7,7 @@ import numpy as np
 
 from . import spectra
 from .images import BYTES, IMAGES, pixels
-from .losses import present, refuse
+from .losses import present, refuse, step
 
 FLIP_V = np.array([[1.0, 0, 0], [0, -1, 1], [0, 0, 1]])
 
@@ -144,6 +144,7 @@ class Values:
     # Plugins of textures and spectra.
 
     def texture(self, plugin, numbers=False):
+        step(plugin.place)
         made = getattr(self, "of_" + plugin.kind, None)
         if made is None:
             self.losses.add(plugin.place, f"texture '{plugin.kind}'", "0.5")

@@ -135,10 +135,14 @@ class Importer:
         """Half of the image's width and height, in units of the shorter side where nothing else is said."""
         width, height = self.scene.film["resolution"]
         aspect = found.number("frameaspectratio", width / height)
+        if not 0 < aspect < np.inf:
+            refuse(found.place, f"'frameaspectratio' is {aspect:g}, and a frame has a width and a height")
         half = [aspect, 1.0] if aspect > 1 else [1.0, 1 / aspect]
         window = found.array("screenwindow")
         if window is not None and len(window) == 4:
             half = [(window[1] - window[0]) / 2, (window[3] - window[2]) / 2]
+            if not (half[0] > 0 and half[1] > 0):
+                refuse(found.place, f"'screenwindow' is empty: {', '.join(f'{x:g}' for x in window)}")
             if not np.allclose([window[0] + window[1], window[2] + window[3]], 0, atol=1e-6):
                 self.losses.add(found.place, "a screen window off the middle", "one in the middle")
         if not np.isclose(half[0] / max(half[1], 1e-30), width / height, rtol=0.01):

@@ -4,7 +4,7 @@ import pathlib
 
 from . import spectra
 from .images import powered
-from .losses import present, refuse, suggestion
+from .losses import present, refuse, step, suggestion
 from .mitsuba_materials import renamed_widths, rough_mirror
 
 GREY = {"type": "diffuse", "reflectance": 0.5}
@@ -43,6 +43,7 @@ class Materials:
         return self.made[id(found)], wanted
 
     def of(self, found):
+        step(found.place)
         kind = found.name or "interface"
         make = getattr(self, "of_" + kind, None)
         if make is None:

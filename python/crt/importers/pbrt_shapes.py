@@ -12,13 +12,18 @@ from .meshes import Damaged, faced, ply_header, read_bytes, read_ply
 CORNERS = np.array([[0, 0], [1, 0], [1, 1]], np.float32)  # Texture coordinates of a triangle without any.
 
 
-def has_texture(content, materials):
-    """Does a material look at texture coordinates?"""
+def has_texture(content, materials, seen=None):
+    """Does a material look at texture coordinates? `seen`: names of materials that do not."""
+    seen = set() if seen is None else seen
     if isinstance(content, dict):
-        return "texture" in content or "checker" in content or any(
-            has_texture([materials[name] for name in value] if key == "materials" else value, materials)
-            for key, value in content.items())
-    return isinstance(content, list) and any(has_texture(inner, materials) for inner in content)
+        if "texture" in content or "checker" in content:
+            return True
+        new = [name for name in content.get("materials", ()) if name not in seen]
+        seen.update(new)
+        return any(has_texture(inner, materials, seen) for key, inner in content.items()
+                   if key != "materials") or any(
+            has_texture(materials[name], materials, seen) for name in new)
+    return isinstance(content, list) and any(has_texture(inner, materials, seen) for inner in content)
 
 
 def with_corners(mesh):

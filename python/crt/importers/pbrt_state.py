@@ -6,7 +6,7 @@ import pathlib
 import numpy as np
 
 from . import matrices
-from .losses import refuse, suggestion
+from .losses import FILE_COST, at, refuse, step, suggestion
 from .pbrt_text import Text
 
 DEPTH = 32
@@ -66,6 +66,7 @@ class State:
             if quoted or word not in DIRECTIVES:
                 refuse(text.place(offset), f"there is no directive '{word}'" + suggestion(word, DIRECTIVES))
             place = text.place(offset)
+            at(place)
             if word in ("Include", "Import"):
                 self.include(text, word, place, trail)
             else:
@@ -75,6 +76,7 @@ class State:
             refuse(where, f"{kind}Begin without {kind}End")
 
     def include(self, text, word, place, trail):
+        step(place, FILE_COST)
         name = text.string(word)
         path = self.file(place, name)
         if not path.is_file():

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from . import spectra
-from .losses import present, refuse, suggestion
+from .losses import present, refuse, step, suggestion
 from .images import BYTES, IMAGES, pixels
 from .mitsuba_values import decoded
 
@@ -153,6 +153,7 @@ class Values:
         return made
 
     def texture(self, kind, name, place, depth=0):
+        step(place)
         known = {other for form, other in self.state.textures if form == kind}
         if (kind, name) not in self.state.textures:
             refuse(place, f"there is no texture '{name}' of type '{kind}'" + suggestion(name, known))

@@ -45,6 +45,12 @@ def table(nm, values, outside="zero", scale=1):
 
 def read_spd(path):
     """Wavelengths and values of a file of two columns. Raises ValueError, with the line, or OSError."""
+    most = 1 << 26  # Bytes: a hundred times the longest tables.
+    path = pathlib.Path(path)
+    if not path.is_file():
+        raise ValueError("it is no file")
+    if path.stat().st_size > most:
+        raise ValueError(f"it has more than {most >> 20} MB")
     found = []
     for number, line in enumerate(pathlib.Path(path).read_text(encoding="utf-8").splitlines(), 1):
         words = line.partition("#")[0].replace(",", " ").split()
