@@ -1053,7 +1053,10 @@ void addOutside(std::vector<SectionSchema>& all) {
                    "",
                    {{.name = "file",
                      .required = true,
-                     .doc = "The name of the file, relative to the working directory."},
+                     .doc = "The name of the file, relative to the working directory. It lies below that "
+                            "folder or the scene's own, is not hidden and ends as images do, because scenes "
+                            "come from anybody. A file that is there and is no image of crt's is replaced "
+                            "with `--overwrite` only. `-o` names any file."},
                     {.name = "format",
                      .kind = Kind::Choice,
                      .choices = {"exr", "png", "ppm", "pfm"},
