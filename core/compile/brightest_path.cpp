@@ -23,7 +23,7 @@ constexpr std::uint32_t kLightsPerPlace = 4;
 constexpr std::uint32_t kSamplesOfBsdf = 8;
 /// Tests of surfaces against shadow rays: a tenth of a second.
 constexpr std::uint64_t kTests = 10'000'000;
-constexpr std::uint64_t kLeastRays = 16;
+constexpr std::uint64_t kLeastRays = 4;
 
 /// Rare paths are brighter by more than this than all but a hundredth of those that arrive from anywhere.
 constexpr double kRare = 10;
