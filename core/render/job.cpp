@@ -72,7 +72,10 @@ Files planFiles(const Job& job, const Scene& scene) {
     for (std::size_t i = 0; i < films.size(); ++i) {
         const std::string& film = films[i];
         const bool wanted = i + 1 < films.size() || files.checkpoint_wanted;
-        if (files.resume.empty() || film != files.resume) files.films.look(film, wanted, job.overwrite);
+        if (files.resume.empty() || film != files.resume)
+            files.films.look(film, wanted, job.overwrite);
+        else
+            files.films.goOnFrom(film);
     }
 
     for (const Output& image : files.outputs.images) checkWritable(image.file);

@@ -2,6 +2,7 @@
 
 #include "base/atomic_file.h"
 #include "base/error.h"
+#include "base/log.h"
 #include "film/checkpoint.h"
 #include "image/image_io.h"
 
@@ -61,6 +62,24 @@ bool isImageOfCrt(const std::string& path, OutputFormat format) {
 
 constexpr std::uint64_t kNoFilm =
     std::numeric_limits<std::uint64_t>::max();  // Larger than any, so that it is never replaced.
+
+/// Tells a file from another that takes its name later, and from itself after a change; empty: there is
+/// none.
+std::string fileAt(const std::string& path) {
+    struct stat status {};
+    if (::stat(path.c_str(), &status) != 0) return {};
+    return fmt::format("{}:{}:{}:{}.{}", status.st_dev, status.st_ino, status.st_size,
+                       status.st_mtim.tv_sec, status.st_mtim.tv_nsec);
+}
+
+/// Of the film that is there; what is no film counts as larger than any.
+std::uint64_t samplesAt(const std::string& path) {
+    try {
+        return readCheckpoint(path).first.samples.count();
+    } catch (const Error&) {
+        return kNoFilm;
+    }
+}
 
 }  // namespace
 
@@ -133,8 +152,11 @@ void FilmGuard::look(const std::string& path, bool wanted, bool replace) {
             place.samples = kNoFilm;
         }
     }
+    place.file = fileAt(path);
     places_[path] = place;
 }
+
+void FilmGuard::goOnFrom(const std::string& path) { places_[path].file = fileAt(path); }
 
 void FilmGuard::requireRoom(std::uint64_t samples) const {
     for (const auto& [path, place] : places_)
@@ -149,7 +171,15 @@ void FilmGuard::requireRoom(std::uint64_t samples) const {
 
 std::string FilmGuard::placeFor(const std::string& path, std::uint64_t samples) {
     const auto found = places_.find(path);
-    if (found == places_.end() || samples >= found->second.samples) return path;
+    if (found == places_.end()) return path;
+    if (const std::string now = fileAt(path); now != found->second.file) {
+        found->second.file = now;
+        found->second.samples = now.empty() ? 0 : samplesAt(path);
+        if (found->second.samples > samples)
+            logWarning("another program has written '{}' meanwhile, which holds more samples: it stays",
+                       path);
+    }
+    if (samples >= found->second.samples) return path;
     std::string& beside = found->second.beside;
     std::error_code unreadable;
     const std::string stem = fs::path(path).replace_extension().string();
@@ -165,6 +195,7 @@ void FilmGuard::written(const std::string& path) {
     const auto found = places_.find(path);
     if (found == places_.end()) return;
     found->second.samples = 0;  // What lies there now is of this run.
+    found->second.file = fileAt(path);
     if (found->second.beside.empty()) return;
     std::error_code gone;
     fs::remove(found->second.beside, gone);

@@ -30,12 +30,16 @@ public:
     /// file that is no whole film, unless the name is only one of crt's making (`wanted` is false).
     void look(const std::string& path, bool wanted, bool replace);
 
+    /// For a film that this run goes on from: what is there may be replaced, what another program puts there
+    /// meanwhile only by a larger one.
+    void goOnFrom(const std::string& path);
+
     /// Throws crt::Error(Usage) when one of those that are wanted holds more than the `samples` per pixel
     /// that this run ends with.
     void requireRoom(std::uint64_t samples) const;
 
     /// Where a film of `samples` per pixel goes that is meant for `path`: there, or beside it while a larger
-    /// one lies there.
+    /// one lies there. Looks again where another program has written since.
     std::string placeFor(const std::string& path, std::uint64_t samples);
     /// To be called when it is written: a smaller film of this run beside it is removed.
     void written(const std::string& path);
@@ -45,6 +49,7 @@ private:
         std::uint64_t samples = 0;  ///< Of the film that was there.
         bool wanted = false;
         std::string beside;  ///< Empty until needed.
+        std::string file;    ///< Which file was there; empty: none.
     };
     std::map<std::string, Place> places_;
 };

@@ -13,6 +13,7 @@ Over 450 lines: one demand, made of one fault after another.
 import glob
 import os
 import random
+import re
 import signal
 import subprocess
 import time
@@ -88,6 +89,32 @@ class KilledAtAnyMoment(CliTest):
 
 
 @unittest.skipUnless(can_mount(), "needs root and the right to mount a tmpfs")
+class TwoPrograms(CliTest):
+    """Both go on from one film, the slower one to fewer samples."""
+
+    def test_the_larger_film_stays(self):
+        self.save_samples(2, "c.crtfilm")
+        slow = self.start("scene.yaml", "-b", "fake", "-o", "a.pfm", "--chunk", "1", "--spp", "40",
+                          "--resume", "c.crtfilm", "--checkpoint-every", "1h", fault="slow")
+        # It has looked at the film when it has said what it goes on from.
+        line = slow.stderr.readline()
+        while "resuming" not in line:
+            self.assertTrue(line, "it ended")
+            line = slow.stderr.readline()
+        slow.send_signal(signal.SIGSTOP)  # However slow this machine is, the other is done before.
+        self.crt("scene.yaml", "-b", "fake", "-o", "b.pfm", "--spp", "100", "--resume", "c.crtfilm")
+        larger = self.samples_in("c.crtfilm")
+        self.assertGreaterEqual(larger, 100)
+        slow.send_signal(signal.SIGCONT)
+        slow.communicate()
+        self.assertEqual(slow.returncode, 0)
+        self.assertEqual(self.samples_in("c.crtfilm"), larger)
+        self.assertEqual(self.samples_in("c.partial.crtfilm"), 40)
+
+    def samples_in(self, film):
+        return int(re.search(r"samples +(\d+) per pixel", self.crt("info", film).stdout)[1])
+
+
 class SmallDisk(CliTest):
     """A disk of 192 KiB; the film of 24 x 16 pixels takes 27 KiB, one of 64 x 64 takes 288."""
 
