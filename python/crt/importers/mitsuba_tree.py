@@ -335,14 +335,14 @@ class Reader:
 
     def transform(self, element):
         made = matrices.identity()
-        for step in element.children:
-            tag = step.tag.lower()
+        for part in element.children:
+            tag = part.tag.lower()
             if tag == "transform":  # Of an animation: the first.
-                return self.transform(step)
+                return self.transform(part)
             if tag not in ("translate", "scale", "rotate", "lookat", "matrix"):
-                refuse(step.place, f"<{step.tag}> is unknown within a transform"
-                       + suggestion(step.tag, ["translate", "scale", "rotate", "lookat", "matrix"]))
-            made = getattr(self, "step_" + tag)(step) @ made
+                refuse(part.place, f"<{part.tag}> is unknown within a transform"
+                       + suggestion(part.tag, ["translate", "scale", "rotate", "lookat", "matrix"]))
+            made = getattr(self, "step_" + tag)(part) @ made
         return made
 
     def step_translate(self, step):
