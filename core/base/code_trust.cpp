@@ -138,7 +138,7 @@ std::string whyNot(const struct stat& status, const std::string& name) {
 
 namespace {
 
-/// Of a folder and those above it.
+/// Why a folder, or a folder above it, may not hold code; empty if it may.
 std::string whyNotFrom(std::string folder) {
     const std::string home = homeOfUser();
     for (;; folder = folderOf(folder)) {

@@ -3,7 +3,6 @@
 #include "kernel/path.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdint>
 #include <iterator>
@@ -17,42 +16,44 @@ namespace {
 
 using namespace kernel;
 
-constexpr std::size_t kPlaces = 2048;       ///< About so many, the same number on each material,
-constexpr std::size_t kMostOfMaterial = 64;  ///< but no more than this.
-constexpr std::uint32_t kLightsPerPlace = 4;
+constexpr std::size_t kSurfacePoints = 2048;  ///< Number of surface points, divided evenly among materials.
+constexpr std::size_t kMostOfMaterial = 64;  ///< Points of one material at most.
+constexpr std::uint32_t kLightsPerPoint = 4;
 constexpr std::uint32_t kSamplesOfBsdf = 8;
-/// Tests of surfaces against shadow rays: a tenth of a second.
+/// Intersection tests of shadow rays with surfaces. They take about a tenth of a second.
 constexpr std::uint64_t kTests = 10'000'000;
 constexpr std::uint64_t kLeastRays = 4;
 
-/// Rare paths are brighter by more than this than all but a hundredth of those that arrive from anywhere.
+/// Paths are rare if they are this many times as bright as 99 % of the paths that arrive from random
+/// directions.
 constexpr double kRare = 10;
 constexpr std::size_t kHundredth = 100;
 
-/// A path that carries the light of a lamp.
+/// A path that scatters once and then reaches a light.
 struct LitPath {
-    double luminance;  ///< Where nothing hides the lamp.
+    double luminance;  ///< Of the path if the light is unoccluded.
     CrtRay to_light;
 };
 
-/// What the places of a scene send on of the light that reaches them.
-class Places {
+/// Points on the surfaces of a scene, and the light that they scatter.
+class SurfacePoints {
 public:
-    explicit Places(const CompiledScene& scene) : triangles_(nullptr) {
+    explicit SurfacePoints(const CompiledScene& scene) {
         context_.blob = scene.data();
         context_.scene = reinterpret_cast<const CrtScene*>(scene.data());
         triangles_ = CRT_ARRAY(CrtTriangle, context_.blob, context_.scene->triangles);
     }
 
-    /// Places that do not emit, by materials and then by the author's order.
+    /// Points on surfaces that do not emit, ordered by material and then as in the scene file.
     std::vector<CrtHit> choose() const;
 
-    /// A path that arrives at `hit` from where it mirrors a lamp, and one that arrives from anywhere.
+    /// A path that arrives at `hit` from the mirror direction of a light, and a path that arrives from a
+    /// random direction.
     std::pair<std::optional<LitPath>, std::optional<LitPath>> light(const CrtHit& hit,
                                                                     std::uint32_t number) const;
 
-    /// The brightest that no surface hides, but for `left_out` brighter ones; nothing where all that were
-    /// asked are hidden.
+    /// Luminance of the brightest unoccluded path, after the `left_out` brightest are skipped. Nothing if
+    /// all paths that were tested are occluded.
     std::optional<double> brightest(std::vector<LitPath> paths, std::size_t left_out = 0) const;
 
 private:
@@ -62,14 +63,14 @@ private:
     vec4 mirrored(const CrtBsdf& bsdf, const CrtOffer& offer, CrtSampler& sampler) const;
     std::optional<LitPath> carry(const CrtSurface& surface, const CrtBsdf& bsdf, const CrtOffer& offer,
                                  vec4 share, const CrtWavelengths& wavelengths) const;
-    bool hides(const CrtRay& ray) const;
+    bool occludes(const CrtRay& ray) const;
 
     CrtContext context_{};
-    const CrtTriangle* triangles_;
+    const CrtTriangle* triangles_ = nullptr;
 };
 
-/// A place within what the slot holds; which one, `number` decides.
-CrtHit Places::hitOf(std::uint32_t slot, std::uint32_t instance, std::uint32_t number) const {
+/// A point on the triangle or shape of the slot, chosen by the random numbers of `number`.
+CrtHit SurfacePoints::hitOf(std::uint32_t slot, std::uint32_t instance, std::uint32_t number) const {
     CrtHit hit = crt_no_hit(0);
     hit.slot = slot;
     hit.id = triangles_[slot].id;
@@ -102,7 +103,7 @@ CrtHit Places::hitOf(std::uint32_t slot, std::uint32_t instance, std::uint32_t n
     return hit;
 }
 
-std::vector<CrtHit> Places::choose() const {
+std::vector<CrtHit> SurfacePoints::choose() const {
     const CrtScene& scene = *context_.scene;
     const auto* primitives = CRT_ARRAY(CrtPrimitive, context_.blob, scene.primitives);
     const auto* instances = CRT_ARRAY(CrtInstance, context_.blob, scene.instances);
@@ -117,7 +118,7 @@ std::vector<CrtHit> Places::choose() const {
             of_materials[primitives[id].material].push_back(id);
     const auto used = static_cast<std::size_t>(std::count_if(
         of_materials.begin(), of_materials.end(), [](const auto& ids) { return !ids.empty(); }));
-    const std::size_t each = std::clamp<std::size_t>(kPlaces / std::max<std::size_t>(used, 1), 1,
+    const std::size_t each = std::clamp<std::size_t>(kSurfacePoints / std::max<std::size_t>(used, 1), 1,
                                                      kMostOfMaterial);
     std::map<std::uint32_t, std::vector<std::uint32_t>> instances_of;  // Meshes, by their first primitives.
     for (std::uint32_t i = 0; i < scene.instances.count; ++i)
@@ -138,14 +139,15 @@ std::vector<CrtHit> Places::choose() const {
 }
 
 /// As crt_shade prepares it.
-void Places::prepare(CrtSurface surface, std::uint32_t slot, vec3 wo, vec4 position, CrtBsdf& bsdf) const {
+void SurfacePoints::prepare(CrtSurface surface, std::uint32_t slot, vec3 wo, vec4 position,
+                            CrtBsdf& bsdf) const {
     bsdf.pane_cosine = crt_pane_cosine(&surface, -wo);
     crt_map_normal(&context_, &surface, slot, &wo, &bsdf);
     crt_layered_prepare(&context_, &bsdf, &surface, wo, position, splat4(1), 0);
 }
 
-/// True if part of what arrives goes on in a single direction.
-bool Places::mirrors(const CrtBsdf& bsdf, CrtSampler& sampler) const {
+/// True if the BSDF scatters part of the light into a single direction.
+bool SurfacePoints::mirrors(const CrtBsdf& bsdf, CrtSampler& sampler) const {
     const vec4 kFirstIsHero = make_vec4(1, 0, 0, 0);
     for (std::uint32_t k = 0; k < kSamplesOfBsdf; ++k) {
         const std::uint32_t dimension = CRT_DIM_VERTEX + CRT_DIM_PER_VERTEX * (k + 1);
@@ -157,14 +159,15 @@ bool Places::mirrors(const CrtBsdf& bsdf, CrtSampler& sampler) const {
     return false;
 }
 
-/// Factor on the light's spectrum that crt_ask_light adds.
+/// The factor on the light's spectrum that crt_ask_light computes.
 vec4 scattered(const CrtBsdf& bsdf, const CrtOffer& offer) {
     return crt_is_delta(&bsdf) ? splat4(0) : crt_surface_eval(&bsdf, offer.wi) * offer.irradiance;
 }
 
-/// The same in the direction that mirrors the light: at most the light itself where scattered rays find it
-/// as well. What is seen at a grazing angle is met as seldom as it is bright.
-vec4 Places::mirrored(const CrtBsdf& bsdf, const CrtOffer& offer, CrtSampler& sampler) const {
+/// The same for a path that arrives from the mirror direction of the light. If scattered rays can also reach
+/// the light, the path carries at most its radiance. The cosine compensates for grazing angles, where paths
+/// are brighter and proportionally rarer.
+vec4 SurfacePoints::mirrored(const CrtBsdf& bsdf, const CrtOffer& offer, CrtSampler& sampler) const {
     vec4 share = scattered(bsdf, offer);
     if (offer.pdf > 0) {
         const vec4 whole = splat4(offer.irradiance * offer.pdf);
@@ -174,8 +177,9 @@ vec4 Places::mirrored(const CrtBsdf& bsdf, const CrtOffer& offer, CrtSampler& sa
     return share * crt_abs(dot3(bsdf.wo, bsdf.ns));
 }
 
-std::optional<LitPath> Places::carry(const CrtSurface& surface, const CrtBsdf& bsdf, const CrtOffer& offer,
-                                     vec4 share, const CrtWavelengths& wavelengths) const {
+std::optional<LitPath> SurfacePoints::carry(const CrtSurface& surface, const CrtBsdf& bsdf,
+                                            const CrtOffer& offer, vec4 share,
+                                            const CrtWavelengths& wavelengths) const {
     const auto* lights = CRT_ARRAY(CrtLight, context_.blob, context_.scene->lights);
     const vec4 position = wavelengths.position,
                light = offer.environment
@@ -191,7 +195,7 @@ std::optional<LitPath> Places::carry(const CrtSurface& surface, const CrtBsdf& b
     return LitPath{luminance, ray};
 }
 
-std::pair<std::optional<LitPath>, std::optional<LitPath>> Places::light(const CrtHit& hit,
+std::pair<std::optional<LitPath>, std::optional<LitPath>> SurfacePoints::light(const CrtHit& hit,
                                                                         std::uint32_t number) const {
     CrtSampler sampler = crt_sampler_begin(CRT_SAMPLER_INDEPENDENT, 0, crt_seed(0, 2), number, 0);
     const CrtWavelengths wavelengths =
@@ -213,7 +217,7 @@ std::pair<std::optional<LitPath>, std::optional<LitPath>> Places::light(const Cr
     return {carry(surface, bsdf, offer, mirrored(bsdf, offer, sampler), wavelengths), from_anywhere};
 }
 
-bool Places::hides(const CrtRay& ray) const {
+bool SurfacePoints::occludes(const CrtRay& ray) const {
     if (!(ray.reach > 0)) return false;
     const CrtShear shear = crt_shear(ray);
     for (std::uint32_t slot = 0; slot < context_.scene->triangle_count; ++slot) {
@@ -225,15 +229,15 @@ bool Places::hides(const CrtRay& ray) const {
     return false;
 }
 
-/// From the brightest on; where many of those are hidden, more and more of the next are passed over.
-std::optional<double> Places::brightest(std::vector<LitPath> paths, std::size_t left_out) const {
+/// Tests the brightest paths first. The more of them are occluded, the more of the next are skipped.
+std::optional<double> SurfacePoints::brightest(std::vector<LitPath> paths, std::size_t left_out) const {
     std::stable_sort(paths.begin(), paths.end(),
                      [](const LitPath& a, const LitPath& b) { return a.luminance > b.luminance; });
     const std::uint64_t rays =
         std::max(kTests / std::max<std::uint64_t>(context_.scene->triangle_count, 1), kLeastRays);
     std::size_t next = left_out;
     for (std::uint64_t asked = 0; next < paths.size(); ++asked) {
-        if (asked == rays || !hides(paths[next].to_light)) return paths[next].luminance;
+        if (asked == rays || !occludes(paths[next].to_light)) return paths[next].luminance;
         next += 1 + asked / 8;
     }
     return std::nullopt;
@@ -244,20 +248,20 @@ std::optional<double> Places::brightest(std::vector<LitPath> paths, std::size_t 
 BrightestPath brightestPathOf(const CompiledScene& scene) {
     const auto& header = *reinterpret_cast<const CrtScene*>(scene.data());
     if (header.view != CRT_VIEW_PATH || header.lights.count == 0) return {};
-    const Places places(scene);
+    const SurfacePoints points(scene);
     std::vector<LitPath> mirrored, from_anywhere;
-    const std::vector<CrtHit> hits = places.choose();
+    const std::vector<CrtHit> hits = points.choose();
     for (std::size_t i = 0; i < hits.size(); ++i)
-        for (std::uint32_t k = 0; k < kLightsPerPlace; ++k) {
+        for (std::uint32_t k = 0; k < kLightsPerPoint; ++k) {
             const auto [of_mirror, of_anywhere] =
-                places.light(hits[i], static_cast<std::uint32_t>(i) * kLightsPerPlace + k);
+                points.light(hits[i], static_cast<std::uint32_t>(i) * kLightsPerPoint + k);
             if (of_mirror) mirrored.push_back(*of_mirror);
             if (of_anywhere) from_anywhere.push_back(*of_anywhere);
         }
-    const std::optional<double> brightest = places.brightest(std::move(mirrored));
+    const std::optional<double> brightest = points.brightest(std::move(mirrored));
     if (!brightest) return {};
-    const std::size_t hundredth = hits.size() * kLightsPerPlace / kHundredth;
-    const double ordinary = places.brightest(std::move(from_anywhere), hundredth).value_or(0);
+    const std::size_t hundredth = hits.size() * kLightsPerPoint / kHundredth;
+    const double ordinary = points.brightest(std::move(from_anywhere), hundredth).value_or(0);
     return {*brightest, *brightest > kRare * ordinary};
 }
 

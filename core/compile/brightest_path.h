@@ -1,4 +1,4 @@
-/// How bright the brightest paths of a scene are: what its images may not have met yet.
+/// Luminance of the brightest paths of a scene, which an image may not have sampled yet.
 #pragma once
 
 #include "compile/compile.h"
@@ -8,18 +8,18 @@
 namespace crt {
 
 struct BrightestPath {
-    /// Luminance Y that one path may bring, as the film has it, about; infinite where it is not known.
+    /// Approximate luminance Y that one path can add to the film. Infinite if it is not known.
     double luminance = std::numeric_limits<double>::infinity();
-    /// True if only paths that happen to take a certain direction are as bright: surfaces mirror a small
-    /// light, or scatter it into a narrow lobe. Images with few samples show no trace of such paths.
+    /// True if only paths of a narrow range of directions are as bright, because surfaces mirror a small
+    /// light or scatter it into a narrow lobe. An image with few samples may contain none of them.
     bool rare = false;
 
     bool operator==(const BrightestPath&) const = default;
 };
 
-/// Looks at a few thousand places of the scene's surfaces, from where they mirror a light, with the kernels'
-/// own code. Light that other surfaces hide counts as far as the time for shadow rays lasts; instances hide
-/// none. Does not depend on the order that an acceleration structure gave to surfaces.
+/// Evaluates about two thousand surface points with the kernels' functions, each from the mirror direction
+/// of a light. Shadow rays exclude occluded lights while a budget of tests lasts; instances occlude nothing.
+/// The result does not depend on the acceleration structure.
 BrightestPath brightestPathOf(const CompiledScene& scene);
 
 }  // namespace crt

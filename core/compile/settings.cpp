@@ -40,8 +40,8 @@ void setChannels(const Scene& scene, std::uint32_t aovs, kernel::CrtScene& heade
 #undef CRT_SET_CHANNEL
 }
 
-/// From the scene, whose coordinates are within ±1: beyond it rays meet nothing but rounding, and products
-/// of coordinates leave the range of single precision.
+/// Largest distance from the scene, whose coordinates are within ±1. Farther off, products of coordinates
+/// exceed the range of single precision.
 constexpr double kFarthest = 1e15;
 
 /// Throws unless distances along rays from the camera are numbers, in scene units.

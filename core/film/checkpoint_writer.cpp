@@ -42,7 +42,7 @@ void CheckpointWriter::save(const Film& film, FilmIdentity identity) {
             const ListenerScope scope(listener);
             return tryTo(write_, *copy_, identity);
         });
-    } catch (const std::exception&) {  // No memory for a copy, or no thread: the device waits instead.
+    } catch (const std::exception&) {  // No memory for a copy, or no thread: write now.
         copy_.reset();
         std::promise<std::optional<Error>> written;
         written.set_value(tryTo(write_, film, identity));

@@ -27,9 +27,9 @@ public:
 
     /// Whether the last copy is written, so that save() need not wait for it.
     bool idle() const;
-    /// Takes a copy of the film and begins to write it; where there is no memory for the copy, or no thread
-    /// to write it, the film is written before this returns. Warns when the copy before could not be
-    /// written: rendering goes on, and so do the attempts.
+    /// Takes a copy of the film and writes it on another thread. If there is no memory for the copy or no
+    /// thread, writes the film before it returns. Warns if the previous copy could not be written; rendering
+    /// continues.
     void save(const Film& film, FilmIdentity identity);
     /// Waits for the copy that is being written, and warns when that fails. Whoever writes the same file
     /// next calls this first: otherwise the older film could end up in it.

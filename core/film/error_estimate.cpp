@@ -174,17 +174,16 @@ double measuredSpread(const Film& film, const LuminanceVariance& variance, const
     return std::min(between_pixels, of_samples + 4 * sums.sum * sums.sum * of_luminance);
 }
 
-/// What one path brings at most to the variance of the noisiest pixel of the set. Of replicates, all of it;
-/// where the squares of samples are known, the share of one of the paths that carry the pixel.
+/// The most that a single path adds to the variance of a pixel. Replicates do not tell how many paths
+/// contribute, so it is the whole variance of the noisiest pixel. Squares of samples do.
 double noisiestPath(const Film& film, const LuminanceVariance& variance, const PixelMap& variances,
-                    PixelSet which) {
+                    PixelSet which, const VarianceSums& sums) {
+    if (variance.fromReplicates()) return sums.most;
     double most = 0;
     for (std::uint32_t y = 0; y < film.shape().height; ++y)
         for (std::uint32_t x = 0; x < film.shape().width; ++x)
             if (belongs(x, y, which) && variances.known(x, y))
-                most = std::max(most, variances.at(x, y) * (variance.fromReplicates()
-                                                                ? 1
-                                                                : std::min(variance.excess(x, y), 1.0)));
+                most = std::max(most, variances.at(x, y) * std::min(variance.excess(x, y), 1.0));
     return most;
 }
 
@@ -306,7 +305,7 @@ std::optional<ErrorEstimate> estimateError(const Film& film, PixelSet which, con
     if (e.known() && (too_few || (!met_brightest && (paths.brightest.rare || open_tail()))))
         e.knowledge = ErrorKnowledge::NotYet;
     const double noisiest =
-        sums.known >= kPixelsToMeasure ? noisiestPath(film, variance, variances, which) * unit : 0;
+        sums.known >= kPixelsToMeasure ? noisiestPath(film, variance, variances, which, sums) * unit : 0;
     const double rare = paths.brightest.rare ? of_brightest : 0,
                  chance = kUnmet * rare / total, unmet = kUnmet * std::max(noisiest, rare) / total;
     const auto squared = [&](double probability) {

@@ -69,7 +69,7 @@ struct ErrorEstimate {
     /// Of the mean's variance S: 2 S² / Var S (Satterthwaite 1946), where Var S is measured and not taken
     /// from the normal distribution.
     double degrees_of_freedom = 0;
-    /// Times the mean luminance that single paths may bring which are met by rare chance; 0: no such paths.
+    /// Luminance of the scene's rare brightest paths over the mean luminance; 0 if it has none.
     double rare_paths = 0;
 
     bool known() const { return knowledge == ErrorKnowledge::Known; }

@@ -31,7 +31,7 @@ struct SceneTrait {
 struct FilmRecord {
     std::string title;
     std::uint64_t seed = 0;
-    PathFacts paths;                      ///< Error estimates ask for it.
+    PathFacts paths;                      ///< For error estimates.
     int width = 0, height = 0;            ///< Of the whole film.
     std::array<int, 4> window{};          ///< What the film holds of it: x0, y0, x1, y1, half open.
     std::uint32_t aovs = 0;               ///< Bits of Aov that the scene's EXR files ask for.

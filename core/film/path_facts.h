@@ -1,4 +1,4 @@
-/// What a film's sums do not say of its paths, and estimates of its error ask for.
+/// Properties of a film's paths that its sums do not contain. Error estimates need them.
 #pragma once
 
 #include "compile/brightest_path.h"

@@ -417,7 +417,8 @@ std::uint32_t texelType(const ImageSpec& spec) {
 
 enum class Part { Color, Alpha };
 
-/// The picture of a file, of which an EXR may hold a part alone, or more than all (its data window).
+/// Where the pixels of a file lie in its picture: an EXR's data window may be smaller or larger than its
+/// display window.
 struct Placement {
     explicit Placement(const ImageSpec& spec)
         : width(spec.full_width > 0 ? spec.full_width : spec.width),
@@ -426,7 +427,8 @@ struct Placement {
           top(spec.full_height > 0 ? spec.y - spec.full_y : 0),
           is_whole(left == 0 && top == 0 && width == spec.width && height == spec.height) {}
 
-    /// Pixels of `bytes` bytes from rows of the file's into those of the picture, which are 0.
+    /// Copies the pixels that lie in the picture; the other pixels of `to` stay as they are. `bytes`: of a
+    /// pixel.
     void place(const ImageSpec& spec, const unsigned char* from, unsigned char* to,
                std::size_t bytes) const {
         const std::int64_t first = std::max<std::int64_t>(0, -left),

@@ -34,13 +34,13 @@ std::string identityOf(const std::string& path) {
     return wholeName(path).string();
 }
 
-/// `path` from `folder` on; empty when it is not below.
+/// `path` relative to `folder`; empty if it lies outside.
 fs::path below(const fs::path& folder, const fs::path& path) {
     const fs::path way = wholeName(path).lexically_relative(wholeName(folder));
     return way.empty() || *way.begin() == ".." || way == "." ? fs::path() : way;
 }
 
-/// The first bytes of images that crt writes; those with metadata name it as well.
+/// True if a file begins as the images that crt writes. EXR and PNG also name crt in their metadata.
 bool isImageOfCrt(const std::string& path, OutputFormat format) {
     constexpr std::size_t kMetadata = 65536;
     std::ifstream file(path, std::ios::binary);
@@ -63,8 +63,7 @@ bool isImageOfCrt(const std::string& path, OutputFormat format) {
 constexpr std::uint64_t kNoFilm =
     std::numeric_limits<std::uint64_t>::max();  // Larger than any, so that it is never replaced.
 
-/// Tells a file from another that takes its name later, and from itself after a change; empty: there is
-/// none.
+/// Identity of a file and of its contents, by inode, size and time; empty if there is no file.
 std::string fileAt(const std::string& path) {
     struct stat status {};
     if (::stat(path.c_str(), &status) != 0) return {};
@@ -72,7 +71,7 @@ std::string fileAt(const std::string& path) {
                        status.st_mtim.tv_sec, status.st_mtim.tv_nsec);
 }
 
-/// Of the film that is there; what is no film counts as larger than any.
+/// Samples per pixel of a film. A file that is not a film counts as the largest, so that it stays.
 std::uint64_t samplesAt(const std::string& path) {
     try {
         return readCheckpoint(path).first.samples.count();
@@ -114,20 +113,20 @@ void refuseForeignPlaces(const std::vector<Output>& outputs, const std::string& 
         if (isStandardOutput(output.file)) continue;
         const auto refuse = [&](const std::string& why) {
             throw Error(ErrorKind::Usage,
-                        fmt::format("the scene's output '{}' {}; -o names a file that may be anywhere",
+                        fmt::format("the scene's output '{}' {}; -o accepts any file",
                                     output.file, why),
                         {output.file});
         };
         fs::path way = below(".", output.file);
         if (way.empty()) way = below(folder.empty() ? "." : folder, output.file);
         if (way.empty())
-            refuse("lies outside of the folder where crt was started and of the scene's own");
+            refuse("lies outside the working directory and the folder of the scene");
         for (const fs::path& part : way)
             if (part.string().front() == '.') refuse("is a hidden file or lies in a hidden folder");
         if (!formatOfFile(output.file)) refuse("does not end in .exr, .png, .ppm or .pfm");
         std::error_code unreadable;
         if (!replace && fs::exists(output.file, unreadable) && !isImageOfCrt(output.file, output.format))
-            refuse("would replace a file that is no image of crt's: add --overwrite to replace it");
+            refuse("would replace a file that crt did not write; add --overwrite to replace it");
     }
 }
 

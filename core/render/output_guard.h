@@ -17,10 +17,10 @@ namespace crt {
 void refuseOverInputs(const std::vector<std::string>& inputs, const std::vector<std::string>& outputs,
                       const std::vector<std::string>& films = {});
 
-/// What a scene file names as its outputs, or what is called after it, may come from anybody. Throws
-/// crt::Error(Usage) when an output is neither below the folder where crt was started nor below the scene's
-/// own; when its name, or that of a folder on the way, begins with a dot or does not end as images do; and,
-/// unless `replace`, when a file is there that is no image of crt's.
+/// Protects other files from the output names of a scene file, which may come from an untrusted source.
+/// Throws crt::Error(Usage) for an output outside the working directory and the scene's folder, for a hidden
+/// file or folder, for an extension that is not an image's, and, unless `replace`, for an existing file that
+/// crt did not write.
 void refuseForeignPlaces(const std::vector<Output>& outputs, const std::string& scene_file, bool replace);
 
 /// Films that lie where films will be written. [one thread]
@@ -30,8 +30,8 @@ public:
     /// file that is no whole film, unless the name is only one of crt's making (`wanted` is false).
     void look(const std::string& path, bool wanted, bool replace);
 
-    /// For a film that this run goes on from: what is there may be replaced, what another program puts there
-    /// meanwhile only by a larger one.
+    /// Remembers the film that this run resumes. The run may replace it, but not a larger film that another
+    /// program writes to the same name in the meantime.
     void goOnFrom(const std::string& path);
 
     /// Throws crt::Error(Usage) when one of those that are wanted holds more than the `samples` per pixel
@@ -39,7 +39,7 @@ public:
     void requireRoom(std::uint64_t samples) const;
 
     /// Where a film of `samples` per pixel goes that is meant for `path`: there, or beside it while a larger
-    /// one lies there. Looks again where another program has written since.
+    /// one lies there. Checks again if another program has written to `path`.
     std::string placeFor(const std::string& path, std::uint64_t samples);
     /// To be called when it is written: a smaller film of this run beside it is removed.
     void written(const std::string& path);
@@ -49,7 +49,7 @@ private:
         std::uint64_t samples = 0;  ///< Of the film that was there.
         bool wanted = false;
         std::string beside;  ///< Empty until needed.
-        std::string file;    ///< Which file was there; empty: none.
+        std::string file;    ///< Identity of the file that was there; empty if there was none.
     };
     std::map<std::string, Place> places_;
 };

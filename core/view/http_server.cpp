@@ -29,7 +29,7 @@ namespace http = beast::http;
 using asio::ip::tcp;
 
 constexpr std::size_t kMostConnections = 64;
-/// Of a connection: its socket, and what its context waits with.
+/// File descriptors of one connection: its socket and those of its I/O context.
 constexpr std::size_t kDescriptorsEach = 4;
 constexpr std::chrono::milliseconds kPause{50};
 constexpr std::uint64_t kMostBodyBytes = 65536;
@@ -58,7 +58,7 @@ std::string decoded(std::string_view text) {
     return out;
 }
 
-/// So many that the program keeps half of the descriptors that it may have.
+/// Limits connections to half of the file descriptors of the process.
 std::size_t mostConnections() {
     struct rlimit limit {};
     if (::getrlimit(RLIMIT_NOFILE, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY) return kMostConnections;

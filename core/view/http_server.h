@@ -54,7 +54,7 @@ private:
     class Connection;
 
     void accept();
-    /// A connection from the acceptor onwards; waits for room first.
+    /// Waits for room, accepts one connection and serves it on a thread of its own.
     void acceptOne();
     /// Interrupts the oldest connection that has shown no token, where there are too many, and waits a
     /// moment until one is closed.

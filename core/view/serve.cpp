@@ -81,7 +81,8 @@ bool openInBrowser(const std::string& address, const sigset_t& signals) {
     return started;
 }
 
-/// A page that leads to `address`: the address has the token in it, and command lines are for all to read.
+/// An HTML page that forwards to `address`. All users can read command lines, and the address contains the
+/// token.
 std::string pageThatLeadsTo(const std::string& address) {
     return fmt::format(
         "<!doctype html><meta charset=\"utf-8\"><meta name=\"referrer\" content=\"no-referrer\">"
@@ -90,7 +91,7 @@ std::string pageThatLeadsTo(const std::string& address) {
         address);
 }
 
-/// For files that are nobody else's: a folder of the session, or of temporary files.
+/// Parent of a private folder: $XDG_RUNTIME_DIR, or the folder for temporary files.
 std::filesystem::path privateParent() {
     const char* const runtime = std::getenv("XDG_RUNTIME_DIR");
     std::error_code none;
@@ -118,7 +119,7 @@ void serveView(const ViewOptions& view, const ServeOptions& serve) {
     const std::string address = fmt::format("http://127.0.0.1:{}/?token={}", server.port(), token);
     printOut("{}\n", address);
     flushStandardOutput();
-    std::optional<TemporaryFolder> folder;  // Which only this user can enter.
+    std::optional<TemporaryFolder> folder;  // Mode 0700.
     bool opened = false;
     if (serve.open_browser && hasDesktop()) {
         folder.emplace(privateParent());

@@ -9,7 +9,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <filesystem>
 #include <utility>
 
@@ -125,9 +124,8 @@ namespace {
 /// directions would be rounding.
 void requireReach(const CameraPose& pose, const Camera& camera) {
     constexpr double kMost = 1e9;
-    const auto lengthOf = [](const Vec3d& v) { return std::sqrt(dot(v, v)); };
-    const double own = lengthOf(camera.target - camera.position),
-                 now = lengthOf(pose.target - pose.position), moved = lengthOf(pose.target - camera.target);
+    const double own = length(camera.target - camera.position), now = length(pose.target - pose.position),
+                 moved = length(pose.target - camera.target);
     if (!(now <= kMost * own && now * kMost >= own && moved <= kMost * own))
         throw Error(ErrorKind::Usage, "the camera goes no farther");
 }

@@ -13,7 +13,7 @@ namespace crt::opencl {
 namespace fs = std::filesystem;
 namespace {
 
-/// Empty where PoCL would take /tmp/pocl.
+/// The cache folder that PoCL uses by default; empty if that is /tmp/pocl.
 fs::path folderOfPocl() {
     for (const auto& [variable, below] : {std::pair{"XDG_CACHE_HOME", "pocl/kcache"},
                                           std::pair{"HOME", ".cache/pocl/kcache"}})
@@ -31,7 +31,7 @@ bool isOurs(const fs::path& folder) {
 
 /// Is removed at the end of the process.
 struct PrivateFolder {
-    std::string path = (fs::temp_directory_path() / "crt-pocl-XXXXXX").string();
+    std::string path = (fs::temp_directory_path() / ("crt-pocl-" + std::string(6, 'X'))).string();
     PrivateFolder() {
         if (::mkdtemp(path.data()) != nullptr) ::setenv("POCL_CACHE_DIR", path.c_str(), 1);
     }

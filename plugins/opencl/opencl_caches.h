@@ -3,10 +3,10 @@
 
 namespace crt::opencl {
 
-/// PoCL runs the compiled kernels that it finds in a folder: in $POCL_CACHE_DIR, $XDG_CACHE_HOME or
-/// ~/.cache, and without HOME (cron, systemd, containers) in /tmp/pocl, whoever made that. If another user
-/// can write there, PoCL gets a folder of its own for as long as this process lives. POCL_CACHE_DIR is the
-/// user's word and stays. To be called before anything of OpenCL is. [any thread]
+/// Gives PoCL a private cache folder for the life of the process if another user can write to its default
+/// one, because PoCL executes the kernels that it finds there: $XDG_CACHE_HOME, ~/.cache, or /tmp/pocl
+/// without HOME (cron, systemd, containers). Leaves POCL_CACHE_DIR as the user set it. Call it before any
+/// OpenCL function. [any thread]
 void keepKernelsFromOthers();
 
 }  // namespace crt::opencl

@@ -1128,7 +1128,7 @@ def argument_cases(samples):
         ("--tile", ("0", "x")),
         ("--chunk", ("0", "-1")),
         ("--kernel", ("huge",)),
-        ("--device", ("99", "nobody's")),
+        ("--device", ("99", "no-such-device")),
         ("--checkpoint-every", ("0s", "never")),
     ):
         for value in values:

@@ -59,7 +59,7 @@ class Rendering(CliTest):
         os.makedirs(self.path("home"))
         os.symlink(self.path("home"), self.path("work/link"))
         self.write("home/precious.ppm", "precious")
-        self.write("work/photo.ppm", "no image of crt's")
+        self.write("work/photo.ppm", "crt did not write")
         with open(self.path("work/photo.png"), "wb") as file:
             file.write(b"\x89PNG\r\n\x1a\nof another program")
 
@@ -75,8 +75,8 @@ class Rendering(CliTest):
             ("link/precious.ppm", "outside"),
             (".hidden.ppm", "hidden"),
             (".sub/a.ppm", "hidden"),
-            ("photo.ppm", "no image of crt's"),
-            ("photo.png", "no image of crt's"),
+            ("photo.ppm", "crt did not write"),
+            ("photo.png", "crt did not write"),
         ):
             with self.subTest(name=name):
                 scene = named(name)

@@ -16,8 +16,8 @@
 
 namespace crt::plugin {
 
-/// Who else can write to a folder, or to one above it, whose contents will be run; empty: nobody who may
-/// not. For caches that libraries keep on their own. [any thread]
+/// Says which other user can write to a folder, or to a folder above it. Empty if the folder may hold code
+/// that this process runs. For caches that libraries manage themselves. [any thread]
 std::string whyNotFolder(const std::string& folder);
 
 class KernelCache {

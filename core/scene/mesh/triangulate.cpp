@@ -161,7 +161,7 @@ bool Triangulator::isEar(std::uint32_t corner) const {
     return turn(a, corner, c) > 0.0 && !tree_.anyInside(a, corner, c);
 }
 
-/// True if the way from b to c leads back along that from a to b.
+/// True if the edge from `corner` to `to` runs back along the edge from `from` to `corner`.
 bool Triangulator::turnsBack(std::uint32_t from, std::uint32_t corner, std::uint32_t to) const {
     const PointTree::Point &a = points_[from], &b = points_[corner], &c = points_[to];
     const double p = (a[0] - b[0]) * (c[1] - b[1]), q = (a[1] - b[1]) * (c[0] - b[0]);
@@ -169,14 +169,13 @@ bool Triangulator::turnsBack(std::uint32_t from, std::uint32_t corner, std::uint
     return along > 0 && std::abs(p - q) <= 1e-14 * (std::abs(p) + std::abs(q));
 }
 
-/// True where the outline goes out to a corner and back the same way, or stays where it is: nothing lies in
-/// between.
+/// True for the tip of a spike of zero width, and for a corner that coincides with the next one.
 bool Triangulator::isSpike(std::uint32_t corner) const {
     return points_[corner] == points_[after_[corner]] ||
            turnsBack(before_[corner], corner, after_[corner]);
 }
 
-/// Leaves out the tips of spikes, and returns a corner that is left. `left` counts those.
+/// Removes the tips of spikes and returns a remaining corner. `left` is the number of corners.
 std::uint32_t Triangulator::dropSpikes(std::uint32_t& left) {
     std::uint32_t corner = 0;
     for (std::uint32_t asked = 0; asked < left && left > 3;) {
@@ -190,7 +189,7 @@ std::uint32_t Triangulator::dropSpikes(std::uint32_t& left) {
         before_[c] = a;
         tree_.remove(corner);
         --left;
-        corner = a;  // Without its tip a spike may have another; so its neighbours are asked again.
+        corner = a;  // A spike may have several corners: test the neighbours again.
         asked -= std::min(asked, 2u);
     }
     return corner;

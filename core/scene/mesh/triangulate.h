@@ -47,9 +47,9 @@ private:
 /// unless they cross themselves. Keeps its memory from one polygon to the next.
 class Triangulator {
 public:
-    /// The n − 2 triangles of a polygon of n ≥ 3 corners; valid until the next call. Of one that is not
-    /// convex, corners to which the outline goes and from which it comes back the same way have none. A
-    /// polygon that crosses itself is fanned and counted.
+    /// The n − 2 triangles of a polygon of n ≥ 3 corners; valid until the next call. Spikes of
+    /// zero width in a polygon that is not convex get no triangles. A polygon that crosses itself is fanned
+    /// and counted.
     const std::vector<PolygonTriangle>& split(std::span<const Vec3d> corners);
 
     std::uint64_t crossingPolygons() const { return crossing_; }

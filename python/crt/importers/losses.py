@@ -40,7 +40,7 @@ MOST_STEPS, FILE_COST = 200_000, 20
 
 
 class _Reading:
-    """What an import is at: `place`, and how many steps it has taken."""
+    """The state of an import: the place that it reads, and the number of steps so far."""
 
     def __init__(self, place):
         self.place, self.steps = place, 0
@@ -50,29 +50,28 @@ _reading = contextvars.ContextVar("crt_importers_reading", default=None)
 
 
 def at(place):
-    """Remembers where the import is, for errors that know no place."""
+    """Sets the current place, which errors without a place of their own report."""
     reading = _reading.get()
     if reading is not None:
         reading.place = place
 
 
 def step(place, cost=1):
-    """Counts a material or a texture that is looked at, or, at a higher cost, a file. Raises crt.Error at
-    `place` when there are too many: things that name the next twice double at each step, and a few lines
-    would never end."""
+    """Counts the evaluation of a material or texture, or, at a higher cost, of a file. Raises crt.Error at
+    `place` above MOST_STEPS: references that double at each level would otherwise never end."""
     at(place)
     reading = _reading.get()
     if reading is None:
         return
     reading.steps += cost
     if reading.steps > MOST_STEPS:
-        refuse(place, "this is looked at as the part of something else, again and again: more than "
+        refuse(place, "references double at each level: this scene evaluates more than "
                       f"{MOST_STEPS:,} materials and textures, or {MOST_STEPS // FILE_COST:,} files")
 
 
 @contextlib.contextmanager
 def reading(path):
-    """Within it whatever goes wrong is a crt.Error of kind SCENE with file, line and column."""
+    """A context in which every exception becomes a crt.Error of kind SCENE with file, line and column."""
     token = _reading.set(_Reading(Place(str(path), 1)))
     try:
         with np.errstate(all="ignore"):  # What is not finite is refused in the end.
@@ -80,9 +79,9 @@ def reading(path):
     except Error:
         raise
     except RecursionError:
-        refuse(_reading.get().place, "things are within one another too deep")
+        refuse(_reading.get().place, "elements are nested too deep")
     except MemoryError:
-        refuse(_reading.get().place, "there is not enough memory for what is named here")
+        refuse(_reading.get().place, "there is not enough memory for this")
     except Exception as error:
         words = f"{type(error).__name__}: {error}"
         refuse(_reading.get().place, f"this cannot be read: {printable(words)[:300]}")
@@ -91,7 +90,7 @@ def reading(path):
 
 
 def refuse_infinite(content, name="the scene"):
-    """Raises crt.Error for a number or an array of a scene's content that is not finite."""
+    """Raises crt.Error if a number or an array of the scene is not finite."""
     if isinstance(content, dict):
         for key, inner in content.items():
             refuse_infinite(inner, f"'{key}' of {name}" if name.count("' of ") < 3 else name)
@@ -103,7 +102,7 @@ def refuse_infinite(content, name="the scene"):
 
 
 def printable(text):
-    """Control characters as \\xNN: names come from files, and go to terminals."""
+    """The text with control characters written as \\xNN, so that names from files are safe in terminals."""
     return re.sub(r"[\x00-\x08\x0a-\x1f\x7f-\x9f]", lambda found: f"\\x{ord(found[0]):02x}", text)
 
 

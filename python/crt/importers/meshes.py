@@ -16,7 +16,7 @@ class Damaged(Exception):
     """A file is not what it should be."""
 
 
-# Packed files may be this much larger unpacked: meshes and scenes are 3 to 30 times as large.
+# Limits of the unpacked size of a packed file. Real meshes and scenes expand 3 to 30 times.
 UNPACKED_LEAST, UNPACKED_RATIO = 64_000_000, 200
 
 

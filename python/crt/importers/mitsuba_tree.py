@@ -379,7 +379,7 @@ def place_folder(place):
 
 
 def refuse_circles(plugin, within, without):
-    """A plugin that is a part of itself has no end. Those that are known to be none are `without`."""
+    """Refuses a plugin that contains itself. `without`: ids of plugins known to contain no circle."""
     if any(plugin is outer for outer in within):
         refuse(plugin.place, f"{plugin} '{plugin.id}' is a part of itself")
     if id(plugin) in without:
