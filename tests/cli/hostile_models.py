@@ -71,7 +71,7 @@ def gltf_cases(case):
     gltf("text", "no JSON\n", "a.gltf")
     gltf("no asset", changed(("asset", None)), "'asset' is missing")
     gltf("glTF 1.0", changed(("asset/version", "1.0")), "version 2.0")
-    gltf("an extension that nobody has", changed(("extensionsRequired", ["NO_such"])), "NO_such")
+    gltf("an unknown extension", changed(("extensionsRequired", ["NO_such"])), "NO_such")
     gltf("Draco", changed(("extensionsRequired", ["KHR_draco_mesh_compression"])), "compressed by Draco")
     gltf("JSON 100,000 deep", '{"asset":' + "[" * 100000, "nested")
     gltf("an index beyond the vertices", changed(data=POSITIONS + struct.pack("<3H", 0, 1, 7)), "/meshes/0")
