@@ -111,12 +111,17 @@ void addScene(const crt::CompiledScene& scene, const std::string& name, Variants
 }
 
 int run(int argc, char** argv) {
-    int arch = 90;
+    int arch = 90, part = 1, parts = 1;
     Variants variants;
     for (const auto& [mask, name] : representativeMasks()) addMask(mask, name, variants);
     for (int i = 1; i < argc; ++i) {
         if (std::strcmp(argv[i], "--arch") == 0 && i + 1 < argc) {
             arch = std::atoi(argv[++i]);
+            continue;
+        }
+        if (std::strcmp(argv[i], "--part") == 0 && i + 2 < argc) {
+            part = std::atoi(argv[++i]);
+            parts = std::atoi(argv[++i]);
             continue;
         }
         if (std::strcmp(argv[i], "--only") == 0) {
@@ -148,8 +153,9 @@ int run(int argc, char** argv) {
 
     std::printf("%s, sm_%d, %zu variants\n%9s %6s %6s %8s %8s  %s\n", nvrtc.name().c_str(), arch,
                 variants.size(), "registers", "stack", "spill", "CUBIN kB", "ms", "variant");
-    int failures = 0;
+    int failures = 0, number = 0;
     for (const auto& [key, name] : variants) {
+        if (number++ % parts != part - 1) continue;
         const KernelSpec spec{static_cast<Entry>(key.first), key.second};
         const std::string entry = crt::plugin::entryName(spec.entry);
         const auto start = std::chrono::steady_clock::now();

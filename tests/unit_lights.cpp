@@ -384,6 +384,8 @@ TEST_CASE("what an environment cannot be is refused at its place", "[lights]") {
     const std::string sky = "environment: {sky: {type: 12, zenith_luminance_cd_m2: 1000, ";
     CHECK(parsed(sky + "direction: [0, -1, 0]}}\n").environment->light_sampling);
     CHECK_THAT(refused(sky + "direction: [0, 1, 0]}}\n"), Contains("below the horizon"));
+    CHECK(parsed(sky + "direction: [0, 0, -1], up: [0, 0, 1]}}\n").environment->sky->axes.up[2] == 1);
+    CHECK_THAT(refused(sky + "direction: [0, -1, 0], up: [0, 0, 1]}}\n"), Contains("below the horizon"));
     CHECK_THAT(refused(sky + "direction: [0, -1, 0], rows: 33}}\n"), Contains("even"));
     CHECK_THAT(refused("environment: {sky: {type: 16, zenith_luminance_cd_m2: 1, direction: [0, -1, 0]}}\n"),
                Contains("must be 1 to 15"));

@@ -1,6 +1,6 @@
-"""Models of other people: which render, which are refused and why, and what was dropped of them.
+"""Models and scenes of other people: which render, which are refused and why, and what crt leaves out.
 
-    bench/run assets FOLDER…    every *.glb, *.gltf, *.obj and *.ply below each folder, small
+    bench/run assets FOLDER…    every model and every scene of pbrt or Mitsuba below each folder, small
 
 Times nothing. A model must render, with every pixel finite and not all alike, or be refused with code 3 and
 a sentence; anything else (a crash, a hang, an empty picture, a copy of the program's memory beyond
@@ -15,6 +15,7 @@ import struct
 import subprocess
 import zlib
 
+from . import foreign_scenes
 from .meshes import cell, pixels
 from .results import Results
 
@@ -102,7 +103,7 @@ def sheet(models):
 
 def measure(program, arguments):
     backend = program.backends(BACKENDS)[0][0]
-    results = Results(program, arguments, "assets", "Models of other people")
+    results = Results(program, arguments, "assets", "Models and scenes of other people")
     results.paragraph(
         f"Every glTF, GLB, OBJ and PLY file below each folder as `crt MODEL` renders it, {RESOLUTION} × "
         f"{RESOLUTION} pixels, {SAMPLES} samples, on `{backend}`, within {SECONDS_AT_MOST} s and "
@@ -112,8 +113,13 @@ def measure(program, arguments):
     )
     if arguments.note:
         results.paragraph(arguments.note)
-    corpora = {}
+    corpora, scenes = {}, []
     for folder in arguments.folders:
+        for path in foreign_scenes.scenes(folder):
+            scene = foreign_scenes.Scene(program, backend, folder, path)
+            scenes.append((folder.name, scene))
+            print(f"{folder.name} {scene.name}: {scene.verdict} {scene.ratio or ''} {scene.error or ''}",
+                  flush=True)
         paths = sorted(p for p in folder.rglob("*") if p.suffix.lower() in EXTENSIONS and p.is_file())
         corpora[folder.name] = []
         for path in paths:
@@ -137,6 +143,16 @@ def measure(program, arguments):
     rows = grouped((name, m, "", part) for name, m in named if m.renders()
                    for part in {part for w in m.warnings for part in parts(w)})
     results.table(["files", "for example", "what crt says"], [[row[0], row[1], row[3]] for row in rows])
+    if scenes:
+        results.heading("Scenes of pbrt and Mitsuba")
+        results.paragraph(
+            f"Each after `crt import`, {foreign_scenes.SIDE} pixels on the longer side, "
+            f"{foreign_scenes.SAMPLES} samples. *Ratio*: the mean luminance over that of the reference "
+            "image that comes with the scene. *What changes the picture a lot*: warnings of the import. A "
+            f"picture is black when its mean is below {foreign_scenes.BLACK:g} of white, and white "
+            f"when more than {foreign_scenes.WHITE:.0%} of its values are.")
+        results.table(["scene", "crt", "ratio", "what changes the picture a lot"],
+                      [[cell(str(c)) for c in row] for row in foreign_scenes.table(scenes)])
     results.data = {
         name: [{"file": m.name, "verdict": m.verdict()}
                | ({"error": m.error} if not m.renders() else {"warnings": m.warnings} if m.warnings else {})
@@ -155,7 +171,8 @@ def measure(program, arguments):
     results.shown[str(arguments.pictures)] = "PICTURES"
     results.command(f"crt MODEL --backend {backend} --spp {SAMPLES} -o IMAGE.pfm")
     results.write()
-    return 0 if all(m.renders() or m.refused() for m in everything) else 1
+    fine = all(m.renders() or m.refused() for m in everything) and all(s.holds() for _, s in scenes)
+    return 0 if fine else 1
 
 
 def counts(models):

@@ -50,7 +50,7 @@ COMMANDS = {
     "meshes": (meshes, "OBJ files of other people, in folders: which render, which are refused and why"),
     "assets": (
         assets,
-        "glTF, GLB, OBJ and PLY files of other people: which render, which are refused and why",
+        "models and scenes of other people: which render, which are refused and why",
     ),
     "mtl-agreement": (
         mtl_agreement,
@@ -105,7 +105,7 @@ def main():
             continue
         if name == "assets":
             command.add_argument("folders", nargs="+", type=pathlib.Path, metavar="FOLDER",
-                                 help="looked through for models; named REPOSITORY@COMMIT")
+                                 help="looked through for models and scenes; named REPOSITORY@COMMIT")
             command.add_argument("--note", help="a paragraph for the page, about what is in the folders")
             command.add_argument("--pictures", type=pathlib.Path, metavar="FOLDER",
                                  help="keeps the images, and a sheet of them")

@@ -16,6 +16,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <charconv>
 #include <chrono>
 #include <cstdlib>
 #include <filesystem>
@@ -36,6 +37,7 @@ struct Arguments {
     std::vector<std::string>
         cases;  ///< Ids, names or groups, also several with commas; empty: all of the level.
     Level level = Level::Commit;
+    std::size_t part = 1, parts = 1;       ///< Every `parts`-th of the cases, from number `part` on.
     std::string output;                    ///< Directory for verify.json and its page; empty: none.
     bool list = false;
     bool markdown = false;                 ///< Print docs/stability.md with the figures of `suites` instead.
@@ -53,6 +55,22 @@ std::vector<std::string> splitAtCommas(const std::vector<std::string>& lists) {
             if (!word.empty()) words.push_back(word);
     }
     return words;
+}
+
+void readPart(const std::string& text, Arguments& to) {
+    const char* const end = text.data() + text.size();
+    const auto [slash, failed] = std::from_chars(text.data(), end, to.part);
+    const bool has_slash = failed == std::errc{} && slash != end && *slash == '/';
+    if (!has_slash || std::from_chars(slash + 1, end, to.parts).ptr != end || to.part < 1 ||
+        to.part > to.parts)
+        throw Error(ErrorKind::Usage,
+                    fmt::format("--part is I/N, from 1/N to N/N, such as 2/4; it is not '{}'", text));
+}
+
+std::vector<const Case*> partOf(const std::vector<const Case*>& all, std::size_t part, std::size_t parts) {
+    std::vector<const Case*> some;
+    for (std::size_t i = part - 1; i < all.size(); i += parts) some.push_back(all[i]);
+    return some;
 }
 
 void lookFirstIn(const std::string& directory) {
@@ -115,7 +133,8 @@ int verify(const Arguments& arguments) {
         printOut("{}", registryMarkdown(suites));
         return 0;
     }
-    const std::vector<const Case*> cases = select(splitAtCommas(arguments.cases), arguments.level);
+    const std::vector<const Case*> cases =
+        partOf(select(splitAtCommas(arguments.cases), arguments.level), arguments.part, arguments.parts);
     if (arguments.list) {
         printOut("{}", listText(cases));
         return 0;
@@ -167,6 +186,10 @@ OptionGroup asked(Arguments& to) {
               .read = [&to](const std::string& text) { to.level = *levelNamed(text); },
               .completion = completeWord(levels),
               .choices = levels},
+             {.names = "--part",
+              .placeholder = "I/N",
+              .help = "only every N-th of these cases, from the I-th on: N runs ask them all",
+              .read = [&to](const std::string& text) { readPart(text, to); }},
              {.names = "--list",
               .placeholder = {},
               .help = "show the cases and run nothing",

@@ -49,7 +49,7 @@ def program():
     path = pathlib.Path(os.environ["CRT_PROGRAM"])
 
     def run(*arguments):
-        done = subprocess.run([str(path), *map(str, arguments)], capture_output=True, text=True, timeout=120)
+        done = subprocess.run([str(path), *map(str, arguments)], capture_output=True, text=True, timeout=900)
         assert done.returncode == 0, done.stderr
         return done.stdout
 

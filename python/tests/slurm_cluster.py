@@ -107,10 +107,10 @@ class Slurm:
                     f"--socket={self.folder}/munge.socket", f"--pid-file={self.folder}/munged.pid",
                     f"--log-file={self.folder}/munged.log", f"--seed-file={self.folder}/munged.seed",
                     "--num-threads=2")
-        self.wait(lambda: (self.folder / "munge.socket").exists(), 10, "munged's socket")
+        self.wait(lambda: (self.folder / "munge.socket").exists(), 600, "munged's socket")
         self.daemon("slurmctld", "-D", "-i")
         self.daemon("slurmd", "-D", "-N", host)
-        self.wait(lambda: "idle" in self.run("sinfo", "-h", "-o", "%t", check=False), 60, "an idle node")
+        self.wait(lambda: "idle" in self.run("sinfo", "-h", "-o", "%t", check=False), 600, "an idle node")
 
     def daemon(self, name, *arguments):
         log = open(self.folder / f"{name}.out", "wb")
@@ -122,7 +122,7 @@ class Slurm:
     def run(self, *words, check=True):
         """What the program printed."""
         done = subprocess.run([str(word) for word in words], env=self.environment, capture_output=True,
-                              text=True, timeout=60)
+                              text=True, timeout=900)
         assert not check or done.returncode == 0, f"{words}: {done.stderr}"
         return done.stdout
 
@@ -146,11 +146,11 @@ class Slurm:
     def __exit__(self, *_):
         if hasattr(self, "environment"):
             subprocess.run(["scancel", "--full", f"--user={getpass.getuser()}"], env=self.environment,
-                           timeout=60, capture_output=True, check=False)
+                           timeout=900, capture_output=True, check=False)
         for _, process in reversed(self.processes):  # munged last: the others end by its word.
             process.send_signal(signal.SIGTERM)
             try:
-                process.wait(20)
+                process.wait(300)
             except subprocess.TimeoutExpired:
                 process.kill()
                 process.wait()

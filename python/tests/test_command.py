@@ -6,7 +6,7 @@ import sys
 
 def run(*arguments):
     return subprocess.run([sys.executable, "-m", "crt", *arguments], capture_output=True, text=True,
-                          timeout=60)
+                          timeout=900)
 
 
 def test_what_is_not_written_in_python_is_the_program(program):

@@ -194,10 +194,9 @@ def test_checkpoint_of_another_scene_is_kept(client, box, tmp_path):
     other["sampler.seed"] = 5
     crt.render(other, spp=16, backend="embree").save(path)
     before = path.read_bytes()
-    began = time.monotonic()
+    # Before the first sample, and not at the first checkpoint: progress would fail with another error.
     with pytest.raises(crt.Error) as refused:
-        crt.distributed.render(box, client, spp=1 << 20, checkpoint=path, **ONE)
-    assert time.monotonic() - began < 40  # And not at the first checkpoint, after a minute.
+        crt.distributed.render(box, client, spp=1 << 20, checkpoint=path, on_progress=fail, **ONE)
     assert refused.value.kind == crt.Kind.USAGE and path.read_bytes() == before
 
 
@@ -262,7 +261,7 @@ def test_nothing_is_left_on_the_cluster(client, box):
     crt.distributed.render(box, client, spp=64, parts=9, **ONE)
     with pytest.raises(RuntimeError, match="enough"):
         crt.distributed.render(box, client, spp=1 << 20, on_progress=fail, **ONE)
-    until = time.monotonic() + 20
+    until = time.monotonic() + 600
     while client.run_on_scheduler(lambda dask_scheduler: list(dask_scheduler.tasks)):
         assert time.monotonic() < until
         time.sleep(0.1)
@@ -339,7 +338,7 @@ def test_interrupt_keeps_what_is_done(tmp_path):
             except KeyboardInterrupt:
                 print("handler is back")
     """)
-    done = subprocess.run([sys.executable, "-c", script, os.path.dirname(__file__)], text=True, timeout=100,
+    done = subprocess.run([sys.executable, "-c", script, os.path.dirname(__file__)], text=True, timeout=900,
                           capture_output=True, cwd=tmp_path)
     words = done.stdout.split()
     assert words[:2] == ["end", "interrupted"] and words[3:] == ["handler", "is", "back"], done.stderr
@@ -349,13 +348,13 @@ def test_interrupt_keeps_what_is_done(tmp_path):
 
 def test_no_client():
     done = subprocess.run([sys.executable, "-c", "import crt.distributed as d; d.render('none.yaml')"],
-                          text=True, capture_output=True, timeout=60)
+                          text=True, capture_output=True, timeout=900)
     assert done.returncode == 1 and "crt.errors.Error: there is no client of Dask" in done.stderr
 
 
 def test_without_dask_the_extra_is_named():
     hide = "import sys; sys.modules['distributed'] = None; import crt.distributed"
-    done = subprocess.run([sys.executable, "-c", hide], text=True, capture_output=True, timeout=60)
+    done = subprocess.run([sys.executable, "-c", hide], text=True, capture_output=True, timeout=900)
     assert done.returncode == 1 and "pip install 'crt[cluster]'" in done.stderr
 
 

@@ -26,7 +26,7 @@ Shape "sphere" "float radius" 5
 
 def run(*arguments, cwd):
     return subprocess.run([sys.executable, "-m", "crt", "import", *map(str, arguments)], cwd=cwd,
-                          capture_output=True, text=True, timeout=120, env=os.environ)
+                          capture_output=True, text=True, timeout=900, env=os.environ)
 
 
 def test_a_scene_with_its_meshes_is_written_beside_it(tmp_path):

@@ -291,7 +291,7 @@ def test_what_crt_lacks_is_listed_once_with_its_count(tmp_path):
     ("<scene>\n <shape type='sphere'><float name='radius' value='big'/></shape></scene>", 2, 23, "'big'"),
     ("<scene><shape type='sphere'><float name='radius' value='nan'/></shape></scene>", 1, 29, "finite"),
     ("<scene>\n<shape type='obj'><string name='filename' value='no.obj'/></shape></scene>", 2, 19,
-     "not there"),
+     "does not exist"),
     ("<scene><include filename='scene.xml'/></scene>", 1, 8, "includes itself"),
     ("<scene><shape type='sphere'><ref id='b'/></shape><bsdf type='diffuse' id='bb'/></scene>", 1, 29,
      "did you mean 'bb'?"),

@@ -303,7 +303,7 @@ def test_what_crt_lacks_is_listed_once_with_its_count(tmp_path):
     ('Shape "trianglemesh" "point3 P" [0 0 0 1 0 0 0 1 0] "integer indices" [0 1 3]', 1, 53,
      "none of the 3"),
     ('NamedMaterial "a"\nShape "sphere"', 1, 1, "no material 'a'"),
-    ('Shape "plymesh" "string filename" "no.ply"', 1, 17, "not there"),
+    ('Shape "plymesh" "string filename" "no.ply"', 1, 17, "does not exist"),
     ('Include "scene.pbrt"', 1, 1, "includes itself"),
     ("AttributeBegin", 1, 1, "without AttributeEnd"),
     ("WorldBegin\nAttributeEnd", 2, 1, "without AttributeBegin"),

@@ -79,6 +79,6 @@ def test_a_notebook_finds_what_it_says(path, kernel, tmp_path):
     notebook = nbformat.read(path, as_version=4)
     for claim in CLAIMS[path.stem]:
         notebook.cells.append(nbformat.v4.new_code_cell(f"assert {claim}"))
-    nbclient.NotebookClient(notebook, timeout=120, kernel_name=kernel,
+    nbclient.NotebookClient(notebook, timeout=900, kernel_name=kernel,
                             resources={"metadata": {"path": str(tmp_path)}}).execute()
     assert list(tmp_path.iterdir()) == []

@@ -41,7 +41,7 @@ needs_backend = pytest.mark.skipif(BACKEND is None, reason="no backend can run h
 
 def run_program(*arguments, python="", codes=(0,)):
     done = subprocess.run([os.environ["CRT_PROGRAM"], *map(str, arguments)], capture_output=True, text=True,
-                          timeout=300, env=os.environ | {"CRT_PYTHON": python})
+                          timeout=900, env=os.environ | {"CRT_PYTHON": python})
     assert done.returncode in codes, done.stderr
     return done
 

@@ -33,7 +33,7 @@ def folder(tmp_path, monkeypatch):
 
 def command(*arguments, **more):
     return subprocess.run([sys.executable, "-m", "crt", "slurm", *map(str, arguments)], text=True,
-                          capture_output=True, timeout=60, **more)
+                          capture_output=True, timeout=900, **more)
 
 
 def part_script(folder, part, **environment):
@@ -71,7 +71,7 @@ def test_a_part_goes_on_and_ends(folder):
     running = part_script(folder, 1)
     time.sleep(1.5)
     running.send_signal(signal.SIGTERM)
-    said = running.communicate(timeout=60)[0]
+    said = running.communicate(timeout=900)[0]
     assert running.returncode == 143, said
     before = crt.Film.load(str(parts / "1.crtfilm")).sample_ranges
     assert before[0][0] == 100000 and before[0][1] < 200000 and len(before) == 1
@@ -83,7 +83,7 @@ def test_a_part_goes_on_and_ends(folder):
     running = part_script(folder, 1, PATH=f"{tools}:{os.environ['PATH']}", SLURM_JOB_ID="77")
     time.sleep(1.5)
     running.send_signal(signal.SIGUSR1)
-    said = running.communicate(timeout=60)[0]
+    said = running.communicate(timeout=900)[0]
     assert running.returncode == 143, said
     assert (tools / "called").read_text() == "requeue 77\n"
     after = crt.Film.load(str(parts / "1.crtfilm")).sample_ranges
@@ -91,12 +91,12 @@ def test_a_part_goes_on_and_ends(folder):
     # All but the last samples are there; the third run does these and is done.
     crt.render("my box.yaml", sample_range=(100000, 199990), backend="embree").save(parts / "1.crtfilm")
     running = part_script(folder, 1)
-    said = running.communicate(timeout=60)[0]
+    said = running.communicate(timeout=900)[0]
     assert running.returncode == 0, said
     assert crt.Film.load(str(parts / "1.whole.crtfilm")).sample_ranges == [(100000, 200000)]
     assert not (parts / "1.crtfilm").exists()
     running = part_script(folder, 1)
-    assert "part 1 is done" in running.communicate(timeout=60)[0] and running.returncode == 0
+    assert "part 1 is done" in running.communicate(timeout=900)[0] and running.returncode == 0
 
 
 def test_merge_says_what_is_missing(folder):
@@ -152,11 +152,11 @@ def test_real_slurm(folder):
                                capture_output=True)
         assert again.returncode == 2 and "are still there" in again.stderr
 
-        cluster.wait(lambda: (parts / "3.crtfilm").exists(), 60, "film of part 3")
+        cluster.wait(lambda: (parts / "3.crtfilm").exists(), 900, "film of part 3")
         kill_program(parts / "3.crtfilm")
-        cluster.wait(lambda: (parts / "5.crtfilm").exists(), 60, "film of part 5")
+        cluster.wait(lambda: (parts / "5.crtfilm").exists(), 900, "film of part 5")
         cluster.run("scontrol", "requeue", f"{array}_5")
-        cluster.wait(lambda: ended(cluster, merge), 120, "end of the merging job")
+        cluster.wait(lambda: ended(cluster, merge), 900, "end of the merging job")
         states = cluster.states(array)
         assert states[f"{array}_3"] == "FAILED", states
         assert cluster.states(merge) == {merge: "FAILED"}
@@ -170,7 +170,7 @@ def test_real_slurm(folder):
                                capture_output=True)
         assert again.returncode == 0 and "1 of 8 parts" in again.stdout, again.stderr
         array, merge = (folder / "my box.slurm/jobs").read_text().strip().split(",")
-        cluster.wait(lambda: ended(cluster, merge), 120, "end of the merging job")
+        cluster.wait(lambda: ended(cluster, merge), 900, "end of the merging job")
         assert cluster.states(merge) == {merge: "COMPLETED"}, cluster.logs()
         log = (folder / "my box.slurm/logs/3.log").read_text()
         assert f"after {kept} samples per pixel" in log and kept > 0

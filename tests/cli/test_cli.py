@@ -278,6 +278,17 @@ class Verify(CliTest):
     def test_list_names_cases(self):
         self.assertIn("square-light", self.crt("verify", "--list").stdout)
 
+    def test_parts_of_verify_are_all_of_it(self):
+        def cases(*part):
+            text = self.crt("verify", "--list", "--level", "merge", *part).stdout
+            return re.findall(r"^ *([A-Z]\d\d) ", text, re.MULTILINE)
+        whole, parts = cases(), [cases("--part", f"{i}/3") for i in (1, 2, 3)]
+        self.assertGreater(len(whole), 200)
+        self.assertEqual(sorted(sum(parts, [])), whole)
+        self.assertLessEqual(max(map(len, parts)) - min(map(len, parts)), 1)
+        for word in ("0/3", "4/3", "2", "1/0", "a/b", "1/3x", "-1/3", ""):
+            self.assert_one_error(self.crt("verify", "--list", f"--part={word}", expect=2), "--part")
+
 
 if __name__ == "__main__":
     harness.main(__doc__)

@@ -79,7 +79,7 @@ class Completion(CliTest):
             env={**harness.environment(), "PATH": os.path.dirname(harness.CRT) + ":" + os.environ["PATH"]},
             capture_output=True,
             text=True,
-            timeout=60,
+            timeout=harness.PATIENCE_SECONDS,
         )
         # compopt works only while bash completes.
         self.assertEqual(run.stderr, "")
@@ -318,7 +318,7 @@ class StandardStreams(CliTest):
             input=stdin,
             stdout=options.pop("stdout", subprocess.PIPE),
             stderr=subprocess.PIPE,
-            timeout=120,
+            timeout=harness.PATIENCE_SECONDS,
         )
         self.assertEqual(run.returncode, expect, run.stderr.decode())
         return run

@@ -75,7 +75,7 @@ class KilledAtAnyMoment(CliTest):
             return None
         return status.st_ino, status.st_mtime_ns
 
-    def wait_until(self, condition, seconds=60):
+    def wait_until(self, condition, seconds=harness.PATIENCE_SECONDS):
         end = time.monotonic() + seconds
         while not condition():
             self.assertLess(time.monotonic(), end, "waited in vain")
@@ -183,7 +183,7 @@ class SmallDisk(CliTest):
         self.fill()
         time.sleep(0.4)
         os.remove(self.path("disk/ballast"))
-        _, messages = process.communicate(timeout=60)
+        _, messages = process.communicate(timeout=harness.PATIENCE_SECONDS)
         self.assertEqual(process.returncode, 0, messages)
         self.assertIn("rendering goes on, and so do the attempts", messages)
         self.assertEqual(self.report("a.report.json")["samples"]["per_pixel"], 40)
@@ -209,7 +209,7 @@ class SmallDisk(CliTest):
         )
         self.wait_for_rendering(process, resumed=True)
         subprocess.run(["mount", "-o", "remount,ro", self.path("disk")], check=True)
-        _, messages = process.communicate(timeout=60)
+        _, messages = process.communicate(timeout=harness.PATIENCE_SECONDS)
         self.assertEqual(process.returncode, 6, messages)
         self.assertIn("Read-only file system", messages)
         self.assertEqual(self.report("a.report.json")["samples"]["per_pixel"], 30)
@@ -237,7 +237,7 @@ class UnsoundBackends(CliTest):
         time.sleep(0.5)
         self.assertIsNone(process.poll(), "the first signal waits for the chunk")
         process.send_signal(signal.SIGINT)
-        process.communicate(timeout=10)
+        process.communicate(timeout=harness.PATIENCE_SECONDS)
         self.assertEqual(process.returncode, 130)
         self.assertEqual(read_bytes(self.path("c.crtfilm")), saved)
 
@@ -312,7 +312,7 @@ class SignalStorm(CliTest):
         for _ in range(20):
             for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
                 process.send_signal(number)
-        _, messages = process.communicate(timeout=60)
+        _, messages = process.communicate(timeout=harness.PATIENCE_SECONDS)
         self.assertIn(process.returncode, (130, 143, 129), messages)
         samples = self.report("a.report.json")["samples"]["per_pixel"]
         self.assertTrue(0 < samples < 64)
@@ -326,7 +326,7 @@ class SignalStorm(CliTest):
         end = time.monotonic() + 10
         while process.poll() is None and time.monotonic() < end:
             process.send_signal(random.choice((signal.SIGINT, signal.SIGTERM, signal.SIGHUP)))
-        process.communicate(timeout=10)
+        process.communicate(timeout=harness.PATIENCE_SECONDS)
         # By itself, or, when all is done and signals have their usual meaning again, by the last signal; a
         # shell says 128 + n in both cases.
         code = process.returncode if process.returncode >= 0 else 128 - process.returncode

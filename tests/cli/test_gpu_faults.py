@@ -425,7 +425,7 @@ class KernelCaches(FakeGpuTest):
                 for i in range(4)
             ]
             for i, process in enumerate(processes):
-                _, messages = process.communicate(timeout=self.TIMEOUT_SECONDS)
+                _, messages = process.communicate(timeout=harness.PATIENCE_SECONDS)
                 self.assertEqual(process.returncode, 0, messages)
                 self.assertNotIn("warning", messages)
                 self.assert_same(f"{i}.pfm", "whole.pfm")

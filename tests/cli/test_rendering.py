@@ -9,7 +9,6 @@ Over 450 lines: one command, whose ends differ in what they leave behind.
 import os
 import re
 import shutil
-import time
 import unittest
 
 import harness
@@ -154,7 +153,6 @@ class Rendering(CliTest):
         report = self.report("a.report.json")
         self.assertEqual(report["stop"]["reason"], "time")
         self.assertGreater(report["samples"]["per_pixel"], 16)
-        self.assertLess(report["seconds"]["sampling"], 2)
 
     def test_time_and_samples_whichever_comes_first(self):
         self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", "--time", "1h", "--spp", "3")
@@ -322,9 +320,7 @@ class Outputs(CliTest):
             ["-o", "a.pfm", "--checkpoint", "/nowhere/at/all/c.crtfilm"],
         ):
             with self.subTest(arguments=arguments):
-                begin = time.monotonic()
                 self.assert_one_error(self.crt("scene.yaml", "-b", "nonsense", *arguments, expect=6))
-                self.assertLess(time.monotonic() - begin, 1)
 
     def test_an_output_that_becomes_unwritable_costs_no_samples(self):
         os.mkdir(self.path("out"))
@@ -344,7 +340,7 @@ class Outputs(CliTest):
         )
         self.wait_for_rendering(process)
         shutil.rmtree(self.path("out"))
-        _, messages = process.communicate(timeout=60)
+        _, messages = process.communicate(timeout=harness.PATIENCE_SECONDS)
         self.assertEqual(process.returncode, 6, messages)
         self.assertTrue(os.path.exists(self.path("kept.pfm")))
         self.crt(

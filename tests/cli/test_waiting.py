@@ -60,7 +60,6 @@ def has_embree():
 
 
 class Waiting(CliTest):
-    TIMEOUT_SECONDS = 280  # Meshes of two million triangles, with a sanitizer.
 
     def setUp(self):
         super().setUp()
@@ -73,7 +72,7 @@ class Waiting(CliTest):
     def report(self, name="a.report.json"):
         return super().report(name)
 
-    def on_terminal(self, *arguments, until, timeout=120, **changes):
+    def on_terminal(self, *arguments, until, timeout=harness.PATIENCE_SECONDS, **changes):
         """What a terminal of 100 columns shows until `until` is there; then Ctrl-C. Returns (text, exit
         status)."""
         pid, terminal = pty.fork()
@@ -182,7 +181,7 @@ class Waiting(CliTest):
             self.assertIsNone(process.poll(), f"{command} has ended by itself")
             process.send_signal(signal.SIGINT)
             try:
-                said, _ = process.communicate(timeout=120)
+                said, _ = process.communicate(timeout=harness.PATIENCE_SECONDS)
             except subprocess.TimeoutExpired:
                 process.kill()
                 said, _ = process.communicate()
@@ -208,10 +207,8 @@ class Waiting(CliTest):
         self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", CRT_FAKE_SCENE_SECONDS="0.5")
         seconds = self.report()["seconds"]
         self.assertGreater(seconds["prepare"], 0.5)
-        self.assertLess(seconds["other"], 0.4)
-        self.assertGreaterEqual(
-            seconds["other"], 0
-        )  # Counted twice, it would be half a second less than nothing.
+        # Counted twice, it would be half a second less than nothing.
+        self.assertGreaterEqual(seconds["other"], 0)
 
     def test_no_bvh_for_a_backend_that_brings_its_own(self):
         if not has_embree():

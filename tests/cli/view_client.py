@@ -8,9 +8,9 @@ import urllib.parse
 import urllib.request
 
 import harness
+from harness import PATIENCE_SECONDS
 
 TOKEN = "0123456789abcdefghij"
-PATIENCE_SECONDS = 60
 
 
 class View:

@@ -27,7 +27,7 @@ if CHROMIUM is None:
     print("skipped: there is no Chromium (Debian: chromium)")
     sys.exit(77)
 
-PATIENCE_SECONDS = 60
+PATIENCE_SECONDS = 900  # Only ends hangs: the machine may have much else to do.
 DONE = "view.picture && view.picture.divisor === 1 && view.status.samples === view.status.samples_wanted" \
     " && view.picture.samples === view.status.samples && view.picture.of_this_camera && !sending"
 LENS = LIT.replace("fov: 40", "fov: 40, aperture_radius: 0.05")

@@ -12,6 +12,7 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -123,7 +124,9 @@ void glossUnderMany(Context& context) {
                                {"{type: diffuse, reflectance: 0.5}", 0.5}})
         for (const auto& [technique, integrator] : kDirectTechniques)
             for (const bool lamps_below : {true, false}) {
-                if (!lamps_below && !context.atLeast(Level::Merge)) continue;
+                // Scattered rays alone choose no lamp, and the lamps below only matter to the tree.
+                const bool chooses = lamps_below && std::string_view(technique) != "scattered rays";
+                if (!chooses && !context.atLeast(Level::Merge)) continue;
                 context.estimate(
                     fmt::format("{}, {} lamps below, {}", floor.material, lamps_below ? 80 : 0, technique),
                     tiledRoom(floor.material, integrator, lamps_below), meanRadiance, floor.albedo, 0.003,

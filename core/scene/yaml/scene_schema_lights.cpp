@@ -211,7 +211,8 @@ void addLights(std::vector<SectionSchema>& all) {
                 spectralKey("radiance", "W·m⁻²·sr⁻¹·nm⁻¹", "Radiance of the disk."),
                 amountKey("illuminance_lx", "lx", "Illuminance of a plane that faces the sun."),
                 spectrumKey()),
-         joined(sunRules(), KeyRule{KeyRule::Kind::ExactlyOne, {"radiance", "illuminance_lx"}},
+         joined(sunRules(), KeyRule{KeyRule::Kind::AtMostOne, {"direction", "up"}},
+                KeyRule{KeyRule::Kind::ExactlyOne, {"radiance", "illuminance_lx"}},
                 noSpectrumBeside("radiance"))});
 }
 
@@ -282,8 +283,7 @@ std::vector<KeyRule> sunRules() {
     return {{Rule::ExactlyOne, {"direction", "date"}},
             {Rule::Together, {"date", "time", "latitude_deg", "longitude_deg"}},
             {Rule::AtMostOne, {"direction", "utc_offset"}},
-            {Rule::AtMostOne, {"direction", "north"}},
-            {Rule::AtMostOne, {"direction", "up"}}};
+            {Rule::AtMostOne, {"direction", "north"}}};
 }
 
 }  // namespace crt

@@ -39,12 +39,18 @@ def main(arguments):
     made = import_scene(given.scene, definitions(given.define))
     remarks = [f"From {os.path.basename(given.scene)}."]
     if made.losses:
-        remarks += ["What crt has not, where it stands first, and what is used instead:",
+        remarks += ["Features that crt does not have, where each occurs first, and what it uses instead:",
                     *(f"  {loss}".replace("\n", " ") for loss in made.losses)]
     if given.output == "-":
         sys.stdout.write(writer.to_text(made.content, remarks))
     else:
         writer.to_file(made.content, remarks, given.output, given.overwrite)
-    for loss in made.losses:
-        print(f"crt: warning: {loss}", file=sys.stderr)
+    report(made.losses)
     return 0
+
+
+def report(losses):
+    """Prints the losses: a warning for each that changes the picture a lot, a line for each other."""
+    for loss in losses:
+        kind = "warning: the picture changes a lot" if loss.large else "not imported"
+        print(f"crt: {kind}: {loss}", file=sys.stderr)

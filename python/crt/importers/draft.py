@@ -100,7 +100,8 @@ class Draft:
                                              mirror))
         made["lights"] = [placed(light, mirror) for light in self.lights]
         if self.environment is not None:
-            made["environment"] = self.environment
+            made["environment"] = {key: placed(inner, mirror) if key == "sky" else inner
+                                   for key, inner in self.environment.items()}
         stem = self.path.name.partition(".")[0]
         made["outputs"] = [{"file": f"{stem}.exr"}, {"file": f"{stem}.png"}]
         used = names_used(made["objects"], self.materials)
@@ -144,6 +145,22 @@ def placed(keys, mirror):
         if key in made:
             made[key] = matrices.numbers(matrices.vector(mirror, made[key]))
     return made
+
+
+def has_texture(content, materials, seen=None):
+    """Does a material look at texture coordinates? `seen`: names of materials that do not."""
+    seen = set() if seen is None else seen
+    if isinstance(content, dict):
+        if "texture" in content or "checker" in content:
+            return True
+        inner_names = [*content.get("materials", ()), *(content[key] for key in ("front", "back")
+                                                        if isinstance(content.get(key), str))]
+        new = [name for name in inner_names if name not in seen]
+        seen.update(new)
+        return any(has_texture(inner, materials, seen) for key, inner in content.items()
+                   if key not in ("materials", "front", "back")) or any(
+            has_texture(materials[name], materials, seen) for name in new)
+    return isinstance(content, list) and any(has_texture(inner, materials, seen) for inner in content)
 
 
 def stretches(placements):

@@ -24,10 +24,28 @@ class Place:
 
 
 def present(path, place):
-    """The path. Raises crt.Error at the place that names it, where there is no file."""
-    if not path.is_file():
-        refuse(place, f"'{path}' is not there")
-    return path
+    """The path. Raises crt.Error at the place that names it, where there is no file; the error lists every
+    other file that the scene names and that does not exist either."""
+    if path.is_file():
+        return path
+    reading = _reading.get()
+    others = {}
+    for resolve, where in reading.named if reading else ():
+        other = resolve()
+        if not other.is_file() and other != path:
+            others.setdefault(str(other), where)
+    lines = [f"'{other}' ({where})" for other, where in list(others.items())[:MOST_MISSING]]
+    more = len(others) - len(lines)
+    refuse(place, f"the file '{path}' does not exist"
+           + (f"; these do not exist either: {', '.join(lines)}" if lines else "")
+           + (f" and {more} more" if more > 0 else ""))
+
+
+def names_file(resolve, place):
+    """Records that the scene names a file at `place`; `resolve()` returns its path once all is parsed."""
+    reading = _reading.get()
+    if reading is not None and len(reading.named) < MOST_STEPS:
+        reading.named.append((resolve, place))
 
 
 def refuse(place, sentence):
@@ -37,13 +55,15 @@ def refuse(place, sentence):
 
 
 MOST_STEPS, FILE_COST = 200_000, 20
+MOST_MISSING = 20  # Missing files that one error lists.
 
 
 class _Reading:
-    """The state of an import: the place that it reads, and the number of steps so far."""
+    """The state of an import: the place that it reads, the number of steps so far, and the files that the
+    scene names."""
 
     def __init__(self, place):
-        self.place, self.steps = place, 0
+        self.place, self.steps, self.named = place, 0, []
 
 
 _reading = contextvars.ContextVar("crt_importers_reading", default=None)
@@ -114,13 +134,14 @@ def suggestion(name, known):
 
 @dataclasses.dataclass
 class Loss:
-    """What a scene has and crt has not: `what` it is, what is used instead, how often it stands there, and
-    where it stands first."""
+    """A feature of a scene that crt does not have: `what` it is, what crt uses `instead`, the `first` place
+    of it, how often (`count`) it occurs, and whether the picture changes a lot without it (`large`)."""
 
     what: str
     instead: str
     first: Place
     count: int = 1
+    large: bool = False
 
     def __str__(self):
         times = f" ({self.count} times)" if self.count > 1 else ""
@@ -128,16 +149,17 @@ class Loss:
 
 
 class Losses:
-    """Each kind of loss once, with its count and its first place, in the order in which they were met."""
+    """Each kind of loss once, with its count and its first place: first those that change the picture a lot,
+    then the others, both in the order of the file."""
 
     def __init__(self):
         self._all = {}
 
-    def add(self, place, what, instead="left out"):
+    def add(self, place, what, instead="left out", large=False):
         if (what, instead) in self._all:
             self._all[what, instead].count += 1
         else:
-            self._all[what, instead] = Loss(what, instead, place)
+            self._all[what, instead] = Loss(what, instead, place, large=large)
 
     def list(self):
-        return list(self._all.values())
+        return sorted(self._all.values(), key=lambda loss: not loss.large)

@@ -4,17 +4,16 @@ import math
 
 import numpy as np
 
-from . import matrices, shapes, sky_image, spectra
+from . import matrices, mitsuba_sky, sky_image, spectra
 from .images import pixels
-from .losses import at, present, refuse, step, suggestion
-from .meshes import Damaged, faced, ply_vertex, read_obj, read_ply, read_serialized
+from .losses import at, refuse, step, suggestion
 from .mitsuba_materials import Materials
+from .mitsuba_shapes import Shapes
 from .mitsuba_tree import Reader
 from .mitsuba_values import Values
-from .draft import BLACK, Draft, Thing, ball, meshed, plate, stretches, tube
+from .draft import BLACK, Draft, Thing, has_texture, stretches
 
 ENDLESS = 1_000_000  # Depths that Mitsuba writes as -1; Russian roulette ends paths before.
-SKY = 0.2  # Luminance of the even sky that stands for Mitsuba's models.
 AREA = ("area", "directionalarea")
 
 
@@ -33,7 +32,7 @@ class Importer:
         self.losses = self.scene.losses
         self.values = Values(reader, self.losses)
         self.materials = Materials(reader, self.scene)
-        self.has_uvs, self.has_colors = True, False  # The mesh that is being read.
+        self.shapes = Shapes(reader, self.losses)
         self.groups = {}  # By the identity of a shapegroup: itself, and its instances' matrices.
 
     def scene_of(self, tree):
@@ -54,9 +53,12 @@ class Importer:
                 self.thing(shape, placements, in_group=True)
             self.unused(group)
         for medium in tree.all("medium"):
-            self.losses.add(medium.place, "participating media", "empty space")
+            self.medium(medium.place)
         for plugin in self.materials.left:
             self.unused(plugin)
+
+    def medium(self, place):
+        self.losses.add(place, "participating media", "empty space", large=True)
 
     def unused(self, plugin):
         """Lists parameters that nothing asked for."""
@@ -76,7 +78,10 @@ class Importer:
             self.scene.integrator = {"max_depth": 1}
             return None
         if plugin.kind not in ("path", "volpath", "volpathmis"):
-            self.losses.add(plugin.place, f"{plugin}", "path tracing")
+            depth = int(plugin.number("max_depth", -1))
+            own = ", ".join(f"'{name}'" for name in sorted(plugin.left - {"rr_depth", "hide_emitters"}))
+            self.losses.add(plugin.place, f"{plugin}" + (f" with {own}" if own else ""), "path tracing")
+            plugin.left &= {"rr_depth", "hide_emitters"}
         # Mitsuba counts a path's edges, crt what happens between them.
         depth = int(plugin.number("max_depth", -1))
         self.scene.integrator = {"max_depth": ENDLESS if depth < 0 else max(depth - 1, 0)}
@@ -95,7 +100,7 @@ class Importer:
         matrix = plugin.transform()
         aspect = width / height
         if plugin.kind == "orthographic":
-            self.orthographic(plugin, matrix)
+            self.orthographic(plugin, matrix, aspect)
         else:
             if plugin.kind not in ("perspective", "thinlens"):
                 self.losses.add(plugin.place, f"{plugin}", "a perspective camera")
@@ -112,9 +117,10 @@ class Importer:
                 plugin.left.discard(name)
         self.unused(plugin)
 
-    def orthographic(self, plugin, matrix):
+    def orthographic(self, plugin, matrix, aspect):
         self.losses.add(plugin.place, f"{plugin}", "a perspective camera from far away")
-        half = np.linalg.norm(matrix[:3, 0])
+        # Mitsuba's x axis is half of the image's width; crt's field of view spans the shorter side.
+        half = np.linalg.norm(matrix[:3, 0]) * min(1, 1 / aspect)
         rigid = matrix.copy()
         rigid[:3, :3] /= np.maximum(np.linalg.norm(matrix[:3, :3], axis=0), 1e-30)
         far = 1000 * half
@@ -195,7 +201,7 @@ class Importer:
         make = getattr(self, "light_" + plugin.kind, None)
         if make is None:
             known = [name[6:] for name in dir(self) if name.startswith("light_")]
-            self.losses.add(plugin.place, f"{plugin}{suggestion(plugin.kind, known)}")
+            self.losses.add(plugin.place, f"{plugin}{suggestion(plugin.kind, known)}", large=True)
             return
         make(plugin)
         plugin.get("sampling_weight")
@@ -214,7 +220,7 @@ class Importer:
             self.losses.add(plugin.place, "a spot whose light falls linearly in the angle",
                             "Hermite's cubic of the cosine")
         if plugin.part("texture"):
-            self.losses.add(plugin.place, "the texture of a spot", "without it")
+            self.losses.add(plugin.place, "the texture of a spot", "without it", large=True)
         self.scene.lights.append({
             "type": "spot", "position": matrix[:3, 3], "direction": self.forward(plugin, matrix),
             "cone_angle_deg": cone, "penumbra_deg": cone - full,
@@ -244,7 +250,8 @@ class Importer:
         matrix, scale = plugin.transform(), plugin.number("scale", 1)
         found = pixels(path)
         if found is None:
-            self.losses.add(plugin.place, f"an environment image of type '{path.suffix}'", "even light")
+            self.losses.add(plugin.place, f"an environment image of type '{path.suffix}'", "even light",
+                            large=True)
             self.one_environment(plugin, {"radiance": spectra.d65(max(scale, 0))})
             return
         turn = sky_image.about_y(matrix)
@@ -257,15 +264,26 @@ class Importer:
 
     def one_environment(self, plugin, made):
         if self.scene.environment is not None:
-            self.losses.add(plugin.place, "a second environment", "the first alone")
+            self.losses.add(plugin.place, "a second environment", "the first alone", large=True)
             return
         self.scene.environment = made
 
     def sky(self, plugin):
-        """The models of Mitsuba's skies have no counterpart of the same size."""
-        self.losses.add(plugin.place, f"{plugin}", "an even sky")
-        plugin.left.clear()
-        self.one_environment(plugin, {"radiance": spectra.d65(SKY)})
+        """CIE's clear sky and a sun, with the direction and the illuminance of Mitsuba's."""
+        found = mitsuba_sky.Daylight(plugin, self.reader.version < (2, 0))
+        if plugin.kind == "timed_sunsky":
+            self.losses.add(plugin.place, f"{plugin}", "the sky of one time", large=True)
+        if found.elevation_deg <= 0:
+            self.losses.add(plugin.place, f"the light of a sun {-found.elevation_deg:.1f} degrees below the "
+                            "horizon", large=True)
+            plugin.left.clear()
+            return
+        if sky := found.sky():
+            self.losses.add(plugin.place, f"the distribution of light over the sky of {plugin}",
+                            f"CIE standard sky {sky['type']} of the same illuminance")
+            self.one_environment(plugin, {"sky": sky})
+        if sun := found.sun():
+            self.scene.lights.append(sun)
 
     light_sunsky = light_sky = light_sun = light_timed_sunsky = sky
 
@@ -290,23 +308,26 @@ class Importer:
 
     def thing(self, plugin, placements, in_group=False):
         at(plugin.place)
-        make = getattr(self, "shape_" + plugin.kind, None)
-        if make is None:
-            known = [name[6:] for name in dir(self) if name.startswith("shape_")]
-            self.losses.add(plugin.place, f"{plugin}{suggestion(plugin.kind, known)}")
+        found = self.shapes.read(plugin)
+        if found is None:
+            close = suggestion(plugin.kind, self.shapes.known())
+            self.losses.add(plugin.place, f"{plugin}{close}", large=True)
             return
-        self.has_uvs, self.has_colors = True, False
-        matrix, geometry = make(plugin)
+        matrix, geometry = found
         places = [placement @ matrix for placement in placements]
-        geometry = geometry(stretches(places))
         # What crt reads as v is 1 - v in Mitsuba's spheres, and in its OBJ files unless that is off.
         flip_v = plugin.kind == "sphere" or (
             plugin.kind == "obj" and plugin.get("flip_tex_coords", True) is not False)
-        material = self.materials.name(plugin.one("bsdf"), flip_v=flip_v, has_uvs=self.has_uvs,
-                                       has_colors=self.has_colors)
+        # Before version 2 a shape with a medium and without a bsdf lets light pass; later it is diffuse.
+        passes = self.reader.version < (2, 0) and plugin.all("medium") and not plugin.all("bsdf")
+        material = None if passes else self.materials.name(
+            plugin.one("bsdf"), flip_v=flip_v, has_uvs=self.shapes.has_uvs,
+            has_colors=self.shapes.has_colors)
+        textured = material and has_texture(self.scene.materials[material], self.scene.materials)
+        geometry = geometry(stretches(places), textured)
         emission = self.emission(plugin, in_group)
         if plugin.all("medium"):
-            self.losses.add(plugin.place, "participating media", "empty space")
+            self.medium(plugin.place)
         for name in ("silhouette_sampling_weight", "optimize"):
             plugin.get(name)
         self.unused(plugin)
@@ -322,10 +343,10 @@ class Importer:
         if emitter is None:
             return None
         if in_group:
-            self.losses.add(emitter.place, "lights within a shapegroup", "dark surfaces")
+            self.losses.add(emitter.place, "lights within a shapegroup", "dark surfaces", large=True)
             return None
         if emitter.kind not in AREA:
-            self.losses.add(emitter.place, f"{emitter} of a shape", "a dark surface")
+            self.losses.add(emitter.place, f"{emitter} of a shape", "a dark surface", large=True)
             return None
         if emitter.kind == "directionalarea":
             self.losses.add(emitter.place, f"{emitter}", "emitter 'area'")
@@ -333,97 +354,3 @@ class Importer:
         emitter.get("sampling_weight")
         self.unused(emitter)
         return made
-
-    def flip(self, plugin):
-        return bool(plugin.get("flip_normals", False))
-
-    def shape_sphere(self, plugin):
-        center, radius = plugin.triple("center", [0, 0, 0]), plugin.number("radius", 1)
-        if radius <= 0:
-            refuse(plugin.place, "a sphere has a radius above 0")
-        flip = self.flip(plugin)
-        return (plugin.transform() @ matrices.translation(*center),
-                lambda stretched: ball(radius, stretched, flip=flip))
-
-    def shape_disk(self, plugin):
-        flip = self.flip(plugin)
-        return plugin.transform(), lambda stretched: plate(1, stretched, flip=flip)
-
-    def shape_cylinder(self, plugin):
-        low, high = (np.array(plugin.triple(name, default), float)
-                     for name, default in (("p0", [0, 0, 0]), ("p1", [0, 0, 1])))
-        length = np.linalg.norm(high - low)
-        radius = plugin.number("radius", 1)
-        if length == 0 or radius <= 0:
-            refuse(plugin.place, "a cylinder has a length and a radius above 0")
-        flip = self.flip(plugin)
-        axis = (high - low) / length
-        other = np.cross([0, 0, 1], axis)
-        angle = math.degrees(math.atan2(np.linalg.norm(other), axis[2]))
-        turn = matrices.rotation(other if np.any(other) else [1, 0, 0], angle)
-        return (plugin.transform() @ matrices.translation(*low) @ turn,
-                lambda stretched: tube(radius, 0, length, stretched, flip=flip))
-
-    def shape_rectangle(self, plugin):
-        if self.flip(plugin):
-            return plugin.transform(), lambda stretched: meshed(shapes.rectangle(), True)
-        return plugin.transform(), lambda stretched: {"rectangle": {"size": [2, 2]}}
-
-    def shape_cube(self, plugin):
-        if self.flip(plugin):
-            return plugin.transform(), lambda stretched: meshed(shapes.cube(), True)
-        return plugin.transform(), lambda stretched: {"box": {"size": [2, 2, 2]}}
-
-    def file(self, plugin):
-        name = plugin.get("filename")
-        if not isinstance(name, str):
-            refuse(plugin.place, f"{plugin} has no 'filename'")
-        path = present(self.reader.file(plugin.place, name), plugin.values["filename"][2])
-        return path
-
-    def normals(self, plugin, has_normals):
-        """Mitsuba works normals out where the file has none."""
-        if plugin.get("face_normals", False):
-            return {"normals": "flat"}
-        return {} if has_normals else {"normals": "smooth", "crease_angle_deg": 180}
-
-    def mesh_file(self, plugin, key, path, read, has_normals):
-        """A file as it is, unless its faces must be turned: for Mitsuba normals say where the outside is."""
-        flip = self.flip(plugin)
-        keys = self.normals(plugin, has_normals)
-        if flip or has_normals:
-            try:
-                mesh = read(path)
-            except Damaged as error:
-                refuse(plugin.values["filename"][2], f"'{path}' cannot be read: {error}")
-            turned = faced(mesh)
-            if flip or turned is not mesh:
-                return meshed(turned, flip) | keys
-        return {key: path} | ({"override": True} if key == "obj" else {}) | keys
-
-    def shape_obj(self, plugin):
-        path = self.file(plugin)
-        with open(path, "rb") as file:
-            words = {line[:3] for line in file}
-        has_normals, self.has_uvs = b"vn " in words, b"vt " in words
-        made = self.mesh_file(plugin, "obj", path, read_obj, has_normals)
-        return plugin.transform(), lambda stretched: made
-
-    def shape_ply(self, plugin):
-        path = self.file(plugin)
-        if plugin.get("flip_tex_coords", False):
-            self.losses.add(plugin.place, f"'flip_tex_coords' of {plugin}", "false")
-        names = ply_vertex(path)
-        self.has_uvs, self.has_colors = bool(names & {"u", "s", "texture_u"}), "red" in names
-        made = self.mesh_file(plugin, "ply", path, read_ply, "nx" in names)
-        return plugin.transform(), lambda stretched: made
-
-    def shape_serialized(self, plugin):
-        path = self.file(plugin)
-        try:
-            mesh, is_flat = read_serialized(path, int(plugin.number("shape_index", 0)))
-        except Damaged as error:
-            refuse(plugin.values["filename"][2], f"'{path}' cannot be read: {error}")
-        self.has_uvs = "uvs" in mesh
-        made = meshed(faced(mesh), self.flip(plugin)) | self.normals(plugin, is_flat or "normals" in mesh)
-        return plugin.transform(), lambda stretched: made

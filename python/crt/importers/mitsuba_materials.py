@@ -17,6 +17,10 @@ INDICES = {"vacuum": 1.0, "helium": 1.000036, "hydrogen": 1.000132, "air": 1.000
            "bromine": 1.661, "water ice": 1.31, "fused quartz": 1.458, "pyrex": 1.47, "acrylic glass": 1.49,
            "polypropylene": 1.49, "bk7": 1.5046, "sodium chloride": 1.544, "amber": 1.55, "pet": 1.575,
            "diamond": 2.419}
+# Of GGX, 1 / (1 + t²) of the projected facets lean by more than t widths; of Beckmann's, exp(-t²).
+ROUGH_METAL = ("light that a rough metal loses between its facets",
+               "none is lost: up to 10 % brighter where the metal is very rough")
+WIDER = "GGX of the same width (20 % of its facets lean by more than two widths, of Beckmann's 2 %)"
 YELLOW, RED = {"CuZn", "Au", "TiN"}, {"Cu", "Cu2O", "CuO"}
 
 
@@ -70,7 +74,7 @@ class Materials:
         if make is None:
             known = [name[3:] for name in dir(self) if name.startswith("of_")]
             self.losses.add(plugin.place, f"bsdf '{plugin.kind}'{suggestion(plugin.kind, known)}",
-                            "grey, diffuse")
+                            "grey, diffuse", large=True)
             self.scene_ignores(plugin)
             return Surface({"type": "diffuse", "reflectance": 0.5}, both=True, name=plugin.id)
         made = make(plugin, values)
@@ -108,7 +112,7 @@ class Materials:
     def widths(self, plugin, values, textured):
         """The keys of crt's roughness."""
         if plugin.text("distribution", "beckmann") != "ggx":
-            self.losses.add(plugin.place, "microfacets of Beckmann's distribution", "GGX of the same width")
+            self.losses.add(plugin.place, "microfacets of Beckmann's distribution", WIDER)
         plugin.get("sample_visible")
         if plugin.has("alpha_u", "alpha_v"):
             along = values.constant(plugin, "alpha_u", 0.1)
@@ -129,7 +133,7 @@ class Materials:
         """A factor on what microfacets reflect or let through, which physical surfaces do not have."""
         for name in names:
             if plugin.has(name) and values.reflectance(plugin, name, 1.0) != 1:
-                self.losses.add(plugin.place, f"'{name}' of {plugin}", "1")
+                self.losses.add(plugin.place, f"'{name}' of {plugin}", "1", large=True)
 
     # By the names of Mitsuba.
 
@@ -174,6 +178,7 @@ class Materials:
             color = values.reflectance(plugin, "specular_reflectance", 1.0)
             return Surface(rough_mirror(color, widths))
         self.factor(plugin, values, "specular_reflectance")
+        self.losses.add(plugin.place, *ROUGH_METAL)
         return Surface({"type": "rough_conductor"} | metal | widths)
 
     def of_dielectric(self, plugin, values):
@@ -351,7 +356,8 @@ class Materials:
         return Surface(made, clear=clear)
 
     def of_principledthin(self, plugin, values):
-        self.losses.add(plugin.place, "bsdf 'principledthin'", "bsdf 'principled' without transmission")
+        self.losses.add(plugin.place, "bsdf 'principledthin'", "bsdf 'principled' without transmission",
+                        large=True)
         passing = ("spec_trans", "diff_trans")
         for name in passing:
             plugin.values.pop(name, None)

@@ -8,7 +8,7 @@ import xml.parsers.expat
 import numpy as np
 
 from . import matrices
-from .losses import FILE_COST, Place, at, refuse, step, suggestion
+from .losses import FILE_COST, Place, at, names_file, present, refuse, step, suggestion
 
 PLUGINS = {"scene", "shape", "bsdf", "emitter", "texture", "sensor", "film", "sampler", "integrator",
            "medium", "phase", "rfilter", "volume", "subsurface"}
@@ -237,9 +237,7 @@ class Reader:
 
     def include(self, plugin, element, trail):
         step(element.place, FILE_COST)
-        path = self.file(element.place, self.attribute(element, "filename"))
-        if not path.is_file():
-            refuse(element.place, f"'{path}' is not there")
+        path = present(self.file(element.place, self.attribute(element, "filename")), element.place)
         if path.resolve() in trail:
             refuse(element.place, f"'{path}' includes itself")
         if len(trail) >= DEPTH:
@@ -270,6 +268,8 @@ class Reader:
         if not name:
             refuse(element.place, f"<{tag}> has no 'name'")
         plugin.set(name, value, tag, element.place)
+        if name == "filename" and tag == "string":
+            names_file(lambda: self.file(element.place, value), element.place)
 
     def floats(self, element, name, counts, default=None):
         text = self.attribute(element, name, default)

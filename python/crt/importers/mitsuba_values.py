@@ -162,9 +162,15 @@ class Values:
     def emitted(self, plugin):
         if plugin.kind == "bitmap":
             path, _ = self.image(plugin)
+            if path is None:
+                return spectra.d65(1)
             found = pixels(path)
-            self.losses.add(plugin.place, "a texture that emits light", "its mean colour")
-            return spectra.d65(1) if found is None else spectra.rgb(found.mean((0, 1)).tolist())
+            if found is None:
+                self.losses.add(plugin.place, f"a texture of type '{path.suffix}' that emits light",
+                                "white of radiance 1", large=True)
+                return spectra.d65(1)
+            self.losses.add(plugin.place, "a texture that emits light", "its mean colour", large=True)
+            return spectra.rgb(found.mean((0, 1)).tolist())
         if plugin.kind == "d65":
             scale = plugin.number("scale", 1)
             color = plugin.get("color")
@@ -172,7 +178,7 @@ class Values:
                 spectra.rgb(color, scale)
         made = self.texture(plugin)
         if isinstance(made, dict) and {"texture", "checker", "attribute"} & set(made):
-            self.losses.add(plugin.place, "a texture that emits light", "D65")
+            self.losses.add(plugin.place, "a texture that emits light", "D65", large=True)
             return spectra.d65(1)
         return made
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from . import matrices, pbrt_shapes, sky_image, spectra
-from .draft import BLACK, Draft, Thing, stretches
+from .draft import BLACK, Draft, Thing, has_texture, stretches
 from .images import pixels
 from .losses import present, refuse, suggestion
 from .pbrt_materials import Materials
@@ -14,6 +14,7 @@ from .pbrt_text import Parameters
 from .pbrt_values import Values
 
 SIDED = ("dielectric", "rough_dielectric", "openpbr", "mix")  # Materials that may let light in.
+SAME_IMAGE = {"lightsampler", "regularize", "samplebsdf", "samplelights"}  # Parameters of an integrator.
 FILTERS = {"box": "box", "gaussian": "gaussian"}
 
 
@@ -80,6 +81,9 @@ class Importer:
         if exposure > 0 and exposure != 1:
             self.scene.film |= {"exposure_ev": math.log2(exposure), "apply_to_float": True}
         self.filter(self.setting("PixelFilter", "gaussian"))
+        if film.has("maxcomponentvalue"):
+            self.losses.add(film.place, "'maxcomponentvalue' of the film (a clamp of bright samples)",
+                            "no clamp")
         film.left -= {"filename", "diagonal", "maxcomponentvalue", "savefp16"}
         self.unused(film)
         samples = sampler.number("pixelsamples", 16)
@@ -166,10 +170,12 @@ class Importer:
     def integrator(self):
         found = self.setting("Integrator", "volpath")
         if found.name not in ("path", "volpath", "simplepath", "simplevolpath"):
-            self.losses.add(found.place, f"{found}", "path tracing")
+            own = ", ".join(f"'{name}'" for name in sorted(found.left - {"maxdepth"} - SAME_IMAGE))
+            self.losses.add(found.place, f"{found}" + (f" with {own}" if own else ""), "path tracing")
+            found.left &= {"maxdepth"}
         # Both count scattering events.
         self.scene.integrator = {"max_depth": min(max(int(found.number("maxdepth", 5)), 0), 10**9)}
-        found.left -= {"lightsampler", "regularize", "samplebsdf", "samplelights"}
+        found.left -= SAME_IMAGE
         self.unused(found)
 
     # Lights.
@@ -179,7 +185,7 @@ class Importer:
         make = getattr(self, "light_" + found.name, None)
         if make is None:
             known = [name[6:] for name in dir(self) if name.startswith("light_")]
-            self.losses.add(found.place, f"{found}{suggestion(found.name, known)}")
+            self.losses.add(found.place, f"{found}{suggestion(found.name, known)}", large=True)
             return
         make(found, matrix)
         self.unused(found)
@@ -224,7 +230,7 @@ class Importer:
 
     def light_infinite(self, found, matrix):
         if self.scene.environment is not None:
-            self.losses.add(found.place, "a second infinite light", "the first alone")
+            self.losses.add(found.place, "a second infinite light", "the first alone", large=True)
             found.left.clear()
             return
         if found.has("portal"):
@@ -236,7 +242,8 @@ class Importer:
         path = present(self.state.file(found.place, name), found.values["filename"][2])
         image = pixels(path)
         if image is None:
-            self.losses.add(found.place, "an environment image that crt cannot read", "even light")
+            self.losses.add(found.place, "an environment image that crt cannot read", "even light",
+                            large=True)
             self.scene.environment = {"radiance": self.emission(found, "L", "illuminance", math.pi)}
             return
         scale = found.number("scale", 1)
@@ -251,14 +258,14 @@ class Importer:
         found, graphics = item.parameters, item.graphics
         emitter = graphics.area_light
         if in_object and emitter is not None:
-            self.losses.add(emitter.place, "lights within an object", "dark surfaces")
+            self.losses.add(emitter.place, "lights within an object", "dark surfaces", large=True)
             emitter = None
         inside = graphics.inside
         opacity = self.values.number(found, "alpha", 1.0)
         opacity = opacity if isinstance(opacity, dict) else min(max(opacity, 0.0), 1.0)
         material = self.materials.name(graphics.material, opacity, inside)
-        if inside and "absorption" not in self.scene.materials.get(material, {}):
-            self.losses.add(found.place, "participating media", "empty space")
+        if inside and lets_light_in(self.scene.materials.get(material)):
+            self.losses.add(found.place, "participating media", "empty space", large=True)
         if material is None:
             if emitter is None:
                 return
@@ -268,7 +275,7 @@ class Importer:
         content = self.scene.materials[material]
         sided = emitter is not None or content["type"] in SIDED
         geometry = self.shapes.geometry(found, graphics.reverse, stretches(places), sided=sided,
-                                        textured=pbrt_shapes.has_texture(content, self.scene.materials))
+                                        textured=has_texture(content, self.scene.materials))
         if geometry is None:
             return
         emission = None if emitter is None else self.area(emitter, found, geometry, places[0])
@@ -286,13 +293,20 @@ class Importer:
         if emitter.has("filename"):
             path = self.state.file(emitter.place, emitter.string("filename"))
             image = pixels(path) if path.is_file() else None
-            self.losses.add(emitter.place, "an image that emits light", "its mean colour")
+            self.losses.add(emitter.place, "an image that emits light", "its mean colour", large=True)
             color = None if image is None else image.mean((0, 1)).tolist()
         made = self.emission(emitter, "L", "power", scale_of)
         if color is not None:
             made = spectra.rgb(color, made.get("scale", 1))
         self.unused(emitter)
         return {"radiance": made} | ({"two_sided": True} if two_sided else {})
+
+
+def lets_light_in(content):
+    """Can one see what is inside a body of this material? None is an interface."""
+    if content is None or "opacity" in content or "geometry_opacity" in content:
+        return True
+    return content["type"] in SIDED and "absorption" not in content
 
 
 def upper_illuminance(image):

@@ -5,9 +5,11 @@ import pathlib
 from . import spectra
 from .images import powered
 from .losses import present, refuse, step, suggestion
-from .mitsuba_materials import renamed_widths, rough_mirror
+from .mitsuba_materials import ROUGH_METAL, renamed_widths, rough_mirror
 
 GREY = {"type": "diffuse", "reflectance": 0.5}
+OF_VERSION_3 = {"disney", "fourier", "glass", "kdsubsurface", "matte", "metal", "mirror", "plastic",
+                "substrate", "translucent", "uber"}
 COPPER = {"metal": "Cu"}
 
 
@@ -47,8 +49,11 @@ class Materials:
         kind = found.name or "interface"
         make = getattr(self, "of_" + kind, None)
         if make is None:
+            if kind in OF_VERSION_3:
+                self.state.is_version_3(found.place)
             known = [name[3:] for name in dir(self) if name.startswith("of_")]
-            self.losses.add(found.place, f"{found}{suggestion(kind, known)}", "grey, diffuse")
+            self.losses.add(found.place, f"{found}{suggestion(kind, known)}", "grey, diffuse", large=True)
+            found.left.clear()
             return GREY
         made = make(found)
         if made is not None and found.has("normalmap"):
@@ -154,6 +159,7 @@ class Materials:
         metal = self.metal(found)
         if widths["roughness"] == 0:
             return {"type": "conductor"} | metal
+        self.losses.add(found.place, *ROUGH_METAL)
         return {"type": "rough_conductor"} | metal | widths
 
     def of_coatedconductor(self, found):
@@ -189,13 +195,13 @@ class Materials:
         return {"type": "thin_dielectric", "ior": self.index(found)}
 
     def of_diffusetransmission(self, found):
-        self.losses.add(found.place, f"{found}", "diffuse without transmission")
+        self.losses.add(found.place, f"{found}", "diffuse without transmission", large=True)
         for name in ("transmittance", "scale"):
             found.left.discard(name)
         return {"type": "diffuse", "reflectance": self.values.reflectance(found, "reflectance", 0.25)}
 
     def of_subsurface(self, found):
-        self.losses.add(found.place, f"{found}", "plastic")
+        self.losses.add(found.place, f"{found}", "plastic", large=True)
         color = self.values.reflectance(found, "reflectance", 0.5)
         made = {"type": "plastic", "reflectance": color, "roughness": self.single(found, self.widths(found)),
                 "ior": min(max(found.number("eta", 1.33), 1), 10)}
@@ -203,13 +209,13 @@ class Materials:
         return made
 
     def of_hair(self, found):
-        self.losses.add(found.place, f"{found}", "diffuse")
+        self.losses.add(found.place, f"{found}", "diffuse", large=True)
         color = self.values.reflectance(found, "reflectance", spectra.rgb([0.2, 0.12, 0.07]))
         found.left.clear()
         return {"type": "diffuse", "reflectance": color}
 
     def of_measured(self, found):
-        self.losses.add(found.place, f"{found}", "grey, diffuse")
+        self.losses.add(found.place, f"{found}", "grey, diffuse", large=True)
         found.left.clear()
         return GREY
 

@@ -12,20 +12,6 @@ from .meshes import Damaged, faced, ply_header, read_bytes, read_ply
 CORNERS = np.array([[0, 0], [1, 0], [1, 1]], np.float32)  # Texture coordinates of a triangle without any.
 
 
-def has_texture(content, materials, seen=None):
-    """Does a material look at texture coordinates? `seen`: names of materials that do not."""
-    seen = set() if seen is None else seen
-    if isinstance(content, dict):
-        if "texture" in content or "checker" in content:
-            return True
-        new = [name for name in content.get("materials", ()) if name not in seen]
-        seen.update(new)
-        return any(has_texture(inner, materials, seen) for key, inner in content.items()
-                   if key != "materials") or any(
-            has_texture(materials[name], materials, seen) for name in new)
-    return isinstance(content, list) and any(has_texture(inner, materials, seen) for inner in content)
-
-
 def with_corners(mesh):
     """The mesh with the texture coordinates that pbrt gives to triangles without any."""
     if "uvs" in mesh:
@@ -45,7 +31,7 @@ class Shapes:
         make = getattr(self, "of_" + found.name, None)
         if make is None:
             known = [name[3:] for name in dir(self) if name.startswith("of_")]
-            self.losses.add(found.place, f"{found}{suggestion(found.name, known)}")
+            self.losses.add(found.place, f"{found}{suggestion(found.name, known)}", large=True)
             found.left.clear()
             return None
         return make(found, reverse, stretched, sided, textured)

@@ -6,7 +6,7 @@ import pathlib
 import numpy as np
 
 from . import matrices
-from .losses import FILE_COST, at, refuse, step, suggestion
+from .losses import FILE_COST, at, names_file, present, refuse, step, suggestion
 from .pbrt_text import Text
 
 DEPTH = 32
@@ -29,6 +29,7 @@ class Graphics:
     material: object = None
     area_light: object = None
     inside: str = ""
+    outside: str = ""
     color_space: str = "srgb"
     defaults: dict = dataclasses.field(default_factory=dict)
 
@@ -56,6 +57,7 @@ class State:
         self.objects, self.instances = {}, []
         self.object = None
         self.materials, self.textures, self.media = {}, {}, {}
+        self.version_3 = False
 
     def read(self, path, trail=()):
         text = Text(path)
@@ -78,9 +80,7 @@ class State:
     def include(self, text, word, place, trail):
         step(place, FILE_COST)
         name = text.string(word)
-        path = self.file(place, name)
-        if not path.is_file():
-            refuse(place, f"'{path}' is not there")
+        path = present(self.file(place, name), place)
         if path.resolve() in trail:
             refuse(place, f"'{path}' includes itself")
         if len(trail) >= DEPTH:
@@ -211,6 +211,8 @@ class State:
 
     def do_Film(self, text, place):
         self.setting(text, place, "Film")
+        if self.settings["Film"].name == "image":
+            self.is_version_3(place)
 
     def do_Sampler(self, text, place):
         self.setting(text, place, "Sampler")
@@ -242,18 +244,32 @@ class State:
         self.systems["world"] = matrices.identity()
 
     def do_WorldEnd(self, text, place):
-        """Of earlier versions."""
+        self.is_version_3(place)
+
+    def is_version_3(self, place):
+        """Says once that the scene is of pbrt-v3."""
+        if not self.version_3:
+            self.losses.add(place, "a scene of pbrt-v3", "it is read as one of pbrt-v4; 'pbrt --upgrade' of "
+                            "pbrt-v4 converts it", large=True)
+        self.version_3 = True
 
     # What is there.
 
     def described(self, text, place, kind, directive, category):
         made = text.parameters(kind, text.string(directive), place)
+        for name in ("filename", "normalmap"):
+            if made.values.get(name, ("",))[0] == "string" and made.values[name][1]:
+                self.names(made.values[name])
         made.inherit(self.graphics.defaults.get(category, {}))
         made.color_space = self.graphics.color_space
         return made
 
     def item(self, parameters):
         return Item(parameters, dataclasses.replace(self.graphics))
+
+    def names(self, value):
+        _, texts, place = value
+        names_file(lambda: self.file(place, texts[0]), place)
 
     def do_Shape(self, text, place):
         found = self.item(self.described(text, place, "shape", "Shape", "shape"))
@@ -289,10 +305,13 @@ class State:
         self.media[name] = made
 
     def do_MediumInterface(self, text, place):
-        self.graphics.inside = text.string("MediumInterface")
+        self.graphics.inside = self.graphics.outside = text.string("MediumInterface")
         token = text.peek()
         if token and token[1]:
-            text.next()
+            self.graphics.outside = text.next()[0]
+        if self.graphics.outside:
+            self.losses.add(place, f"the medium '{self.graphics.outside}' outside of shapes", "empty space",
+                            large=True)
 
     def do_Texture(self, text, place):
         name, kind = text.string("Texture"), text.string("Texture")
