@@ -87,7 +87,8 @@ class Denoised:
 
 
 def denoise(result, *, aovs=None):
-    """A guess at the image without its noise, by Open Image Denoise on the processor; needs crt[denoise].
+    """A guess at the image without its noise, by Open Image Denoise on the processor, which needs
+    the libraries pyoidn and OpenEXR.
 
     result  a crt.Result or crt.Film
     aovs    names of the planes that guide it, of "albedo" and "normal"; those that the film has when None. A
@@ -136,4 +137,4 @@ def library(name):
         import OpenEXR
         return OpenEXR
     except ImportError as error:
-        raise Error(f"denoising needs {name} ({error}): pip install 'crt[denoise]'", Kind.USAGE) from error
+        raise Error(f"denoising needs {name} ({error}): pip install pyoidn OpenEXR", Kind.USAGE) from error

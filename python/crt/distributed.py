@@ -18,7 +18,7 @@ try:
     import dask.sizeof
     import distributed
 except ImportError as missing:
-    raise ImportError(f"crt.distributed needs Dask ({missing}): pip install 'crt[cluster]'") from missing
+    raise ImportError(f"crt.distributed needs Dask ({missing}): pip install dask distributed") from missing
 
 from . import _crt
 from .cluster_work import Work

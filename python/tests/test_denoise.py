@@ -17,7 +17,7 @@ SIZE = {"film.resolution": [96, 64], "sampler.type": "independent"}
 
 @pytest.fixture(scope="module")
 def oidn():
-    """The libraries of crt[denoise]; OpenEXR."""
+    """The libraries that denoising needs; OpenEXR."""
     pytest.importorskip("pyoidn", reason="pyoidn is not installed")
     return pytest.importorskip("OpenEXR", reason="OpenEXR is not installed")
 
@@ -107,7 +107,7 @@ def test_what_cannot_be_done_is_said(oidn, tmp_path, box):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_without_the_library_it_names_the_extra(monkeypatch, box):
+def test_without_the_libraries_it_names_them(monkeypatch, box):
     monkeypatch.setitem(sys.modules, "pyoidn", None)
-    with pytest.raises(crt.Error, match=r"pip install 'crt\[denoise\]'"):
+    with pytest.raises(crt.Error, match=r"pip install pyoidn OpenEXR"):
         crt.denoise(crt.render(box, spp=4))
