@@ -14,7 +14,7 @@ from .rendering import Result, develop, planes
 
 MARK = "crt/denoised"
 # Of the header of a measured image: what a denoised one cannot say of itself.
-MEASURED_ONLY = ("channels", "type", "crt/errorDegreesOfFreedom")
+MEASURED_ONLY = ("channels", "type", "crt/errorDegreesOfFreedom", "spectralLayoutVersion", "emissiveUnits")
 
 
 class Denoised:
@@ -107,8 +107,7 @@ def denoise(result, *, aovs=None):
             raise Error(f"'{name}' does not guide the denoiser; albedo and normal do", Kind.USAGE)
     if names == ["normal"]:
         raise Error("the denoiser takes normals only beside albedo", Kind.USAGE)
-    guides = {name: planes(film, name) for name in names}
-    return Denoised(film, guides, result.saved if isinstance(result, Result) else ())
+    return Denoised(film, planes(film, names), result.saved if isinstance(result, Result) else ())
 
 
 def filtered(developed, guides):

@@ -47,6 +47,19 @@ def test_it_is_nearer_to_the_converged_image(oidn, converged, seed):
     assert np.array_equal(before, result.image)
 
 
+def test_a_spectral_film_is_denoised_like_any_other(oidn, converged, tmp_path):
+    """Its bins are no guides, and they are not in the denoised file."""
+    bins = {"film.spectral": {"from_nm": 400, "to_nm": 700, "bins": 6}}
+    result = crt.render(crt.scene(AOVS, set={**SIZE, **bins}), spp=8)
+    denoised = crt.denoise(result)
+    assert denoised.image.shape == (64, 96, 3) and "with albedo and normal" in denoised.made_with
+    assert rmse(denoised.image, converged) < MARGIN * rmse(result.image[..., :3], converged)
+    denoised.save(tmp_path / "a.exr")
+    header = oidn.File(str(tmp_path / "a.exr")).header()
+    assert "spectralLayoutVersion" not in header and "emissiveUnits" not in header
+    assert crt.Image.load(str(tmp_path / "a.exr")).channels == ["R", "G", "B"]
+
+
 def test_files_say_that_they_are_denoised(oidn, tmp_path):
     settings = {**SIZE, "film.exposure_ev": 1, "film.color_space": "acescg"}
     result = crt.render(crt.scene(AOVS, set=settings), spp=8)

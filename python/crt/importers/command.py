@@ -4,9 +4,9 @@ import argparse
 import os
 import sys
 
-from .. import program
+from .. import program, writing
 from ..errors import Error, Kind
-from . import import_scene, is_foreign, writer
+from . import import_scene, is_foreign
 
 
 def parser():
@@ -42,9 +42,9 @@ def main(arguments):
         remarks += ["What crt has not, where it stands first, and what is used instead:",
                     *(f"  {loss}".replace("\n", " ") for loss in made.losses)]
     if given.output == "-":
-        sys.stdout.write(writer.to_text(made.content, remarks))
+        sys.stdout.write(writing.to_text(made.content, remarks))
     else:
-        writer.to_file(made.content, remarks, given.output, given.overwrite)
+        writing.to_file(made.content, remarks, given.output, given.overwrite)
     for loss in made.losses:
         print(f"crt: warning: {loss}", file=sys.stderr)
     return 0
