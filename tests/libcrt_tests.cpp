@@ -161,6 +161,52 @@ TEST_CASE("a scene in memory becomes an image") {
     CHECK(crt::Image::load(folder / "image.png").width() == 32);
 }
 
+TEST_CASE("integer planes of an image have values of their own") {
+    Heard quiet;
+    const crt::Scene scene =
+        crt::Scene::fromText(lampYaml("idle", "outputs: [{file: a.exr, aovs: [samples, depth]}]\n"));
+    const crt::Film film = crt::render(scene, withSamples(3), &quiet).film;
+    crt::DevelopOptions with_aovs;
+    with_aovs.aovs = {"samples", "depth"};
+    const crt::Image image = film.develop(with_aovs);
+    CHECK(image.channels() == std::vector<std::string>{"R", "G", "B", "Z"});
+    REQUIRE(image.integerChannels().size() == 1);
+    CHECK(image.integers() == std::vector<std::uint32_t>(24 * 16, 3));
+    CHECK(film.develop().integers().empty());
+}
+
+TEST_CASE("a composed scene is the same scene, wherever it is read") {
+    const Folder folder;
+    std::filesystem::create_directories(folder / "parts");
+    std::ofstream(folder / "parts/room.yaml") << lampYaml("idle");
+    std::ofstream(folder / "parts/square.obj") << "v -1 0 0\nv 1 0 0\nv 1 1 0\nv -1 1 0\nf 1 2 3 4\n";
+    std::ofstream(folder / "parts/more.yaml")
+        << "crt: 1\nobjects: [{name: board, material: grey, obj: square.obj}]\n";
+    std::ofstream(folder / "user.yaml") << "crt: 1\ninclude: [parts/room.yaml, parts/more.yaml]\n"
+                                           "title: '1\"2'\ncamera: {fov: +5.e1, aperture_radius: .125}\n"
+                                           "materials: {blue: &blue {type: diffuse, reflectance: 1E-1}}\n"
+                                           "integrator: {nee: true}\n";
+    const std::vector<crt::SceneOverride> overrides = {
+        {"film.resolution", "[12, 8]"}, {"materials.grey", "{type: diffuse, reflectance: 0.25}"}};
+    Heard quiet;
+    const std::string text = crt::Scene::composeFile(folder / "user.yaml", overrides, &quiet);
+    for (const std::string part : {"\"fov\": 50,", "\"aperture_radius\": 0.125", "\"title\": \"1\\\"2\"",
+                                   "\"reflectance\": 1E-1", "\"nee\": true", "\"resolution\": [12, 8]"}) {
+        CAPTURE(text, part);
+        CHECK(text.find(part) != std::string::npos);
+    }
+    CHECK(text.find("\"obj\": \"" + (folder / "parts/square.obj") + "\"") != std::string::npos);
+    CHECK(text.find("include") == std::string::npos);
+    const crt::Scene scene = crt::Scene::fromFile(folder / "user.yaml", overrides, &quiet);
+    const crt::Scene again = crt::Scene::fromText(text, {}, &quiet, "scene", "/");
+    CHECK(again.title() == scene.title());
+    CHECK(sameMeans(crt::render(again, withSamples(4), &quiet).film,
+                    crt::render(scene, withSamples(4), &quiet).film));
+    CHECK(crt::Scene::composeText(text, {}, &quiet) == text);
+    CHECK(kindOf([&] { crt::Scene::composeFile(folder / "none.yaml"); }) == 3);
+    CHECK(kindOf([&] { crt::Scene::composeText("crt: 1\nfilm: 3\n"); }) == 3);
+}
+
 TEST_CASE("parts of a film make the whole") {
     const crt::Scene scene = crt::Scene::fromText(lampYaml("idle"));
     Heard quiet;

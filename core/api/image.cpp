@@ -38,6 +38,8 @@ std::uint32_t Image::width() const { return impl_->image.width; }
 std::uint32_t Image::height() const { return impl_->image.height; }
 const std::vector<std::string>& Image::channels() const { return impl_->image.channels; }
 const std::vector<float>& Image::pixels() const { return impl_->image.pixels; }
+const std::vector<std::string>& Image::integerChannels() const { return impl_->image.integer_channels; }
+const std::vector<std::uint32_t>& Image::integers() const { return impl_->image.integers; }
 
 std::vector<float> Image::plane(const std::string& channel) const {
     const std::vector<std::string>& names = channels();

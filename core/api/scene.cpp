@@ -37,6 +37,26 @@ Scene Scene::fromText(const std::string& yaml, const std::vector<SceneOverride>&
     });
 }
 
+std::string Scene::composeFile(const std::string& path, const std::vector<SceneOverride>& overrides,
+                               Watch* watch) {
+    return api::acrossBorder(watch, [&] {
+        const Stage stage("reading " + path);
+        std::string text;
+        loadScene(path, changes(overrides), &text);
+        return text;
+    });
+}
+
+std::string Scene::composeText(const std::string& yaml, const std::vector<SceneOverride>& overrides,
+                               Watch* watch, const std::string& name, const std::string& directory) {
+    return api::acrossBorder(watch, [&] {
+        const Stage stage("reading " + name);
+        std::string text;
+        parseScene(yaml, name, directory, changes(overrides), &text);
+        return text;
+    });
+}
+
 Scene::Scene(std::shared_ptr<const Impl> impl) : impl_(std::move(impl)) {}
 Scene::Scene(const Scene&) = default;
 Scene::Scene(Scene&&) noexcept = default;

@@ -35,6 +35,22 @@ class Arrays:
             return [self.written(inner) for inner in value]
         return value
 
+    def restored(self, value):
+        """The inverse of `written`: a copy of `value` that holds the arrays instead of their files."""
+        arrays = {os.fspath(path): array for array, path in self.files.values()}
+
+        def inverse(value):
+            if isinstance(value, dict):
+                copy = {key: inverse(inner) for key, inner in value.items()}
+                if isinstance(copy.get("ply"), collections.abc.Mapping):  # It was the file of this mesh.
+                    copy["mesh"] = copy.pop("ply")
+                return copy
+            if isinstance(value, list):
+                return [inverse(inner) for inner in value]
+            return arrays.get(value, value) if isinstance(value, str) else value
+
+        return inverse(value)
+
     def mesh(self, mesh):
         """The keys of an object that stand for its `mesh`."""
         if not isinstance(mesh, collections.abc.Mapping) or "colors" in mesh:
@@ -58,6 +74,21 @@ class Arrays:
             (write_tga if texture.dtype == np.uint8 else write_pfm)(path, texture)
             self.files[id(texture)] = (texture, path)
         return os.fspath(self.files[id(texture)][1])
+
+
+def plain(value):
+    """`value` as numbers, strings, lists and dicts, without NumPy."""
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    if isinstance(value, np.generic):
+        return value.item()
+    if isinstance(value, collections.abc.Mapping):
+        return {str(key): plain(inner) for key, inner in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(inner) for inner in value]
+    if isinstance(value, os.PathLike):
+        return os.fspath(value)
+    return value
 
 
 def is_array(value):

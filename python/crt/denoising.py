@@ -14,7 +14,7 @@ from .rendering import Result, develop, planes
 
 MARK = "crt/denoised"
 # Of the header of a measured image: what a denoised one cannot say of itself.
-MEASURED_ONLY = ("channels", "type", "crt/errorDegreesOfFreedom")
+MEASURED_ONLY = ("channels", "type", "crt/errorDegreesOfFreedom", "spectralLayoutVersion", "emissiveUnits")
 
 
 class Denoised:
@@ -87,7 +87,8 @@ class Denoised:
 
 
 def denoise(result, *, aovs=None):
-    """A guess at the image without its noise, by Open Image Denoise on the processor; needs crt[denoise].
+    """A guess at the image without its noise, by Open Image Denoise on the processor, which needs
+    the libraries pyoidn and OpenEXR.
 
     result  a crt.Result or crt.Film
     aovs    names of the planes that guide it, of "albedo" and "normal"; those that the film has when None. A
@@ -106,8 +107,7 @@ def denoise(result, *, aovs=None):
             raise Error(f"'{name}' does not guide the denoiser; albedo and normal do", Kind.USAGE)
     if names == ["normal"]:
         raise Error("the denoiser takes normals only beside albedo", Kind.USAGE)
-    guides = {name: planes(film, name) for name in names}
-    return Denoised(film, guides, result.saved if isinstance(result, Result) else ())
+    return Denoised(film, planes(film, names), result.saved if isinstance(result, Result) else ())
 
 
 def filtered(developed, guides):
@@ -136,4 +136,4 @@ def library(name):
         import OpenEXR
         return OpenEXR
     except ImportError as error:
-        raise Error(f"denoising needs {name} ({error}): pip install 'crt[denoise]'", Kind.USAGE) from error
+        raise Error(f"denoising needs {name} ({error}): pip install pyoidn OpenEXR", Kind.USAGE) from error

@@ -18,13 +18,13 @@ try:
     import dask.sizeof
     import distributed
 except ImportError as missing:
-    raise ImportError(f"crt.distributed needs Dask ({missing}): pip install 'crt[cluster]'") from missing
+    raise ImportError(f"crt.distributed needs Dask ({missing}): pip install dask distributed") from missing
 
 from . import _crt
 from .cluster_work import Work
 from .errors import Error, Kind, RenderFailed
 from .messages import LOGGER
-from .rendering import Bar, Result, as_scene, device_text
+from .rendering import Bar, Result, as_scene, device_text, with_seed
 from .sample_ranges import ENDLESS, Missing, PartSize
 
 SECONDS_A_LOOK = 0.2
@@ -36,9 +36,9 @@ def film_size(film):
     return 72 * film.width * film.height
 
 
-def render(scene, client=None, *, spp=None, parts=None, backend="auto", devices=None, threads=0,
-           target_error=None, time_limit=None, checkpoint=None, checkpoint_every=60, progress=None,
-           on_progress=None):
+def render(scene, client=None, *, spp=None, seed=None, parts=None, backend="auto", devices=None,
+           threads=0, target_error=None, time_limit=None, checkpoint=None, checkpoint_every=60,
+           progress=None, on_progress=None):
     """Renders a scene on the workers of a Dask cluster. Returns a crt.Result.
 
     scene             as crt.render takes it. A file, and files that a text names, must lie at the same path
@@ -46,6 +46,7 @@ def render(scene, client=None, *, spp=None, parts=None, backend="auto", devices=
     client            distributed.Client; the current one of Dask when None
     spp               samples a pixel, those of a checkpoint included; the scene's number when None and
                       neither time nor error ends the render
+    seed              of the random numbers; the scene's sampler.seed when None
     parts             so many, of equal size; of a size that follows the workers' speed when None
     backend, devices, threads   as crt.render takes them, on each worker and for each of its threads
     target_error      stop at this half-width of the error, relative to the mean luminance, in (0, 1). It is
@@ -65,7 +66,7 @@ def render(scene, client=None, *, spp=None, parts=None, backend="auto", devices=
     Raises crt.Error, of a scene before anything is sent; crt.RenderFailed, with the film so far, where the
     cluster fails later.
     """
-    scene = as_scene(scene)
+    scene = with_seed(as_scene(scene), seed)
     check(spp, parts, target_error, time_limit)
     client = client_or_current(client)
     kept = earlier(checkpoint)

@@ -32,6 +32,12 @@ class Error(Exception):
         return type(self), (str(self), self.kind, self.file or "", self.line or 0, self.column or 0)
 
 
+class MissingKey(Error, KeyError):
+    """A key that a scene does not have. A KeyError, too."""
+
+    __str__ = Exception.__str__  # A KeyError puts its sentence into quotes.
+
+
 class RenderFailed(Error):
     """The device failed after the first samples; `film` is what was rendered before."""
 

@@ -43,9 +43,9 @@ class Result:
 
     @functools.cached_property
     def aovs(self):
-        """The AOVs that the scene's outputs ask for, by name: float32, (height, width) or
-        (height, width, 3), top row first."""
-        return {name: planes(self.film, name) for name in self.film.aovs}
+        """The AOVs that the scene's outputs ask for, by name: (height, width), or (height, width, 3) for
+        albedo and normal, top row first; float32, and uint32 for samples and primitive."""
+        return planes(self.film, self.film.aovs)
 
     def save(self, path):
         """Writes the image as `crt render` does, with all metadata: .exr, .png, .ppm or .pfm; or the film,
@@ -65,21 +65,31 @@ class Result:
                 f"{known}, ended by {self.stop}>")
 
 
-def planes(film, aov):
-    pixels = film.develop(aovs=[aov])
-    # These come with every plane of noise, and are channels of their own in an EXR.
-    others = ("R", "G", "B", "HalfWidth95.Y", "OwnVariance.Y")
-    own = [i for i, name in enumerate(pixels.channels) if name not in others]
-    array = pixels.pixels[..., own]
-    return array[..., 0] if len(own) == 1 else array
+# These come with every plane of noise, and are channels of their own in an EXR.
+BESIDE_NOISE = ("HalfWidth95.Y", "OwnVariance.Y")
 
 
-def render(scene, *, spp=None, backend="auto", devices=None, threads=0, target_error=None, time_limit=None,
-           sample_range=None, resume=None, progress=None, use_cache=True, estimate_error=True,
-           on_progress=None):
+def planes(film, names):
+    """The AOVs of these names, as Result.aovs has them. Raises crt.Error of kind USAGE where the film lacks
+    one."""
+    others = {*film.develop().channels, *BESIDE_NOISE} if names else ()
+    return {name: plane(film.develop(aovs=[name]), others) for name in names}
+
+
+def plane(image, others):
+    """The one AOV of an image, whose channels are those that are not among `others`."""
+    own = [i for i, name in enumerate(image.channels) if name not in others]
+    array = image.pixels[..., own] if own else image.integers
+    return array[..., 0] if array.shape[-1] == 1 else array
+
+
+def render(scene, *, spp=None, seed=None, backend="auto", devices=None, threads=0, target_error=None,
+           time_limit=None, sample_range=None, resume=None, progress=None, use_cache=True,
+           estimate_error=True, on_progress=None):
     """Renders a scene: a crt.Scene, a crt.Session, a dict, or the path of a file. Returns a Result.
 
     spp            samples a pixel; the scene's number when None
+    seed           of the random numbers; the scene's sampler.seed when None. A session has its own
     backend        "cuda", "embree", "opencl", the path of a plugin, or "auto": the best of this machine
     devices        an index, a list of indices, a part of a device's name, or "all"; the best when None
     threads        of the host; 0: all. Never changes the image
@@ -97,7 +107,9 @@ def render(scene, *, spp=None, backend="auto", devices=None, threads=0, target_e
     Other threads of Python run meanwhile. Ctrl-C ends sampling and keeps the film: `stop` is "interrupted".
     Raises crt.Error; crt.RenderFailed, with the film so far, when a device fails after the first samples.
     """
-    session = scene if isinstance(scene, Session) else Session(scene)
+    if isinstance(scene, Session) and seed is not None:
+        raise Error("a session renders with one seed: crt.Session(scene, seed=…)", Kind.USAGE)
+    session = scene if isinstance(scene, Session) else Session(scene, seed=seed)
     options = _crt.RenderOptions()
     options.backend = backend
     options.device = device_text(devices)
@@ -131,11 +143,12 @@ class Session:
         with crt.Session("box.yaml") as session:
             parts = [session.render(sample_range=(first, first + 64)) for first in range(0, 256, 64)]
 
-    A session holds memory of its devices until it is closed or forgotten. Threads take turns.
+    `seed` replaces the scene's sampler.seed. A session holds memory of its devices until it is closed or
+    forgotten. Threads take turns.
     """
 
-    def __init__(self, scene):
-        self.scene = as_scene(scene)  # Which keeps the files of its arrays.
+    def __init__(self, scene, *, seed=None):
+        self.scene = with_seed(as_scene(scene), seed)  # Which keeps the files of its arrays.
         self._native = _crt.Session(self.scene.native)
         self._lock = threading.Lock()
 
@@ -168,6 +181,15 @@ def as_scene(scene):
     if isinstance(scene, (str, os.PathLike)):
         return load(scene)
     return scene if isinstance(scene, Scene) else scene_of(scene)
+
+
+def with_seed(scene, seed):
+    """The crt.Scene itself where the seed is None, else a copy with that seed."""
+    if seed is None:
+        return scene
+    copy = scene.copy()
+    copy["sampler.seed"] = seed
+    return copy
 
 
 def device_text(devices):

@@ -1,4 +1,4 @@
-"""Scenes: from files, from text, and from dicts with NumPy arrays in them."""
+"""Scenes: their keys, and the ways to make one."""
 
 import collections.abc
 import contextlib
@@ -6,49 +6,90 @@ import difflib
 import json
 import os
 import pathlib
-import shutil
-import tempfile
-import weakref
 
-import numpy as np
-
-from . import _crt
-from .arrays import Arrays
-from .errors import Error, Kind
-from .messages import tell
+from . import scene_sources, writing
+from .arrays import plain
+from .errors import Error, Kind, MissingKey
 
 
 class Scene:
-    """A scene, and keys of it that have other values than its text says.
+    """A scene, and keys of it that have other values than its text gives.
 
     `scene["film.resolution"] = [320, 200]` sets a key as `crt render --set` does (docs/scene.md has the
     keys); a value is anything that YAML has: numbers, strings, booleans, None, lists, dicts, NumPy scalars
-    and arrays of numbers. The scene is read, and its errors are raised, when it is first rendered or asked
-    for anything, and again after a key was set.
+    and arrays of numbers. `scene["film.resolution"]` is the value that holds now, and `del` forgets the one
+    that was set. `in`, `keys()` and `get()` work as for a dict. A key that neither the text nor you have set
+    is missing: its default is in docs/scene.md. Values are copies: change one by setting its key.
 
-    A scene pickles: of a file its path, for machines that share the file, of text or a dict all of it. Files
-    that the text names are looked up where it is unpickled.
+    crt reads the scene, and raises its errors, when you first render it or ask for anything, and again after
+    a key was set.
+
+    `copy()`, copy.copy and copy.deepcopy give a scene of its own. A scene pickles: of a file its path, for
+    machines that share the file; of text or a dict all of it. Files that the text names are looked up where
+    it is unpickled.
     """
 
-    def __init__(self, read, file, origin, overrides=None):
-        self._read = read
-        self._file = file
-        self._origin = origin  # The function and its arguments that make this scene again.
+    def __init__(self, source, overrides=None):
+        self._source = source
         self._overrides = {}
-        self._native = None
+        self._native = self._content = None
         for key, value in (overrides or {}).items():
             self[key] = value
 
     def __setitem__(self, key, value):
-        if not isinstance(key, str):
-            raise TypeError(f"keys are strings like 'film.resolution', not {key!r}")
-        self._overrides[key] = json.dumps(plain(value))
-        self._native = None
+        self._overrides[text_key(key)] = json.dumps(plain(value), ensure_ascii=False)
+        self._native = self._content = None
 
     def __delitem__(self, key):
         """Forgets a value that was set; the scene's own holds again. Raises KeyError where none was."""
         del self._overrides[key]
-        self._native = None
+        self._native = self._content = None
+
+    def __getitem__(self, key):
+        """The value of a key, such as "camera.position" or "objects.0.material". Raises crt.MissingKey."""
+        return fresh(value_at(self._tree(), text_key(key)))
+
+    def __contains__(self, key):
+        try:
+            value_at(self._tree(), key)
+        except (MissingKey, TypeError):
+            return False
+        return True
+
+    def get(self, key, default=None):
+        """The value of a key, or `default` where the scene does not have it."""
+        return self[key] if key in self else default
+
+    def keys(self):
+        """The sections of the scene: "camera", "film", …"""
+        return list(self._tree())
+
+    def __iter__(self):
+        return iter(self.keys())
+
+    def to_dict(self):
+        """The scene as crt.scene takes it: with all that it includes, with the values that were set, with
+        absolute paths of files, and with the arrays of a scene that was made of some."""
+        return fresh(self._tree())
+
+    def to_yaml(self):
+        """The same as the text of a scene file; meshes of arrays are written out. Raises crt.Error of kind
+        USAGE where a texture is an array: save writes it to a file."""
+        return writing.to_text(self._tree(), ())
+
+    def save(self, path, *, overwrite=False):
+        """Writes the same as a scene file, and larger arrays to the folder NAME.meshes beside it. Files that
+        lie in the folder of `path`, or below it, are named relative to it. Raises crt.Error of kind USAGE
+        where the file exists, unless `overwrite`; of kind OUTPUT where it cannot be written."""
+        folder = os.path.join(os.path.dirname(os.path.abspath(path)), "")
+        named = {os.path.abspath(file) for file in self.files_read}
+        below = {file for file in named if file.startswith(folder)}
+        writing.to_file(with_paths(self._tree(), below), (), path, overwrite)
+
+    def _tree(self):
+        if self._content is None:
+            self._content = self._source.content(list(self._overrides.items()))
+        return self._content
 
     @property
     def overrides(self):
@@ -59,24 +100,25 @@ class Scene:
     def native(self):
         """The scene as libcrt has read it. Raises crt.Error with every error of the text."""
         if self._native is None:
-            self._native = self._read(list(self._overrides.items()))
+            self._native = self._source.read(list(self._overrides.items()))
         return self._native
 
     def copy(self):
         """Another scene of the same text and values, to be changed apart."""
-        other = Scene(self._read, self._file, self._origin)
-        other._overrides = dict(self._overrides)
-        other._native = self._native
+        other = made_again(self._source, self._overrides)
+        other._native, other._content = self._native, self._content
         return other
 
+    __copy__ = copy
+
     def __reduce__(self):
-        return made_again, (*self._origin, self._overrides)
+        return made_again, (self._source, self._overrides)
 
     @contextlib.contextmanager
     def arguments(self):
         """A context manager: meanwhile these arguments show the scene to the program crt. A scene that is
         no file is one meanwhile, beside the files that it names."""
-        with self._file() as path:
+        with self._source.file() as path:
             yield [path, *(word for item in self._overrides.items() for word in ("--set", "=".join(item)))]
 
     @property
@@ -108,28 +150,76 @@ class Scene:
         return self.native.files_read
 
     def __repr__(self):
-        return f"<crt.Scene {self.title!r}, {self.width} x {self.height} pixels>"
+        changed = f", with {', '.join(self._overrides)} set" if self._overrides else ""
+        try:
+            native = self.native
+        except (Error, ValueError) as error:
+            first = str(error).partition("\n")[0]
+            return f"<crt.Scene of {self._source}{changed}, which has errors: {first}>"
+        return (f"<crt.Scene {native.title!r} of {self._source}{changed}: {native.width} x {native.height} "
+                f"pixels, {native.samples} samples a pixel>")
 
 
-def made_again(function, arguments, overrides):
-    made = function(*arguments)
+def made_again(source, overrides):
+    made = Scene(source)
     made._overrides = dict(overrides)
     return made
 
 
-def plain(value):
-    """`value` as numbers, strings, lists and dicts, without NumPy."""
-    if isinstance(value, np.ndarray):
-        return value.tolist()
-    if isinstance(value, np.generic):
-        return value.item()
-    if isinstance(value, collections.abc.Mapping):
-        return {str(key): plain(inner) for key, inner in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [plain(inner) for inner in value]
-    if isinstance(value, os.PathLike):
-        return os.fspath(value)
-    return value
+def text_key(key):
+    if not isinstance(key, str):
+        raise TypeError(f"keys are strings like 'film.resolution', not {key!r}")
+    return key
+
+
+def value_at(tree, key):
+    """The value of a key with dots in a dict. Raises crt.MissingKey, which names the nearest key."""
+    value, rest = tree, text_key(key)
+    while True:
+        part = rest.partition(".")[0]
+        if isinstance(value, dict):  # Names may have dots themselves: the longest that fits is meant.
+            part = max((name for name in value if rest == name or rest.startswith(f"{name}.")),
+                       key=len, default=part)
+            known = part in value
+        else:
+            known = isinstance(value, list) and part.isdecimal() and int(part) < len(value)
+        if not known:
+            raise missing(key, key[:len(key) - len(rest)], part, value)
+        value = value[part if isinstance(value, dict) else int(part)]
+        if rest == part:
+            return value
+        rest = rest[len(part) + 1:]
+
+
+def missing(key, before, part, value):
+    """The error for `part` of `key`, which `value` lacks; `before` is the way to it."""
+    where = f"'{before[:-1]}'" if before else "the scene"
+    if isinstance(value, list):
+        there = f"{where} is a list of {len(value)}, whose first has the index 0"
+    elif not isinstance(value, dict):
+        there = f"{where} is {value!r}"
+    else:
+        near = difflib.get_close_matches(part, value, n=1)
+        there = (f"did you mean '{before}{near[0]}'?" if near
+                 else f"{where} has {', '.join(value)}" if value else f"{where} is empty")
+    return MissingKey(f"the scene does not set '{key}'; {there}", Kind.USAGE)
+
+
+def fresh(value):
+    """A copy of dicts and lists; arrays are shared."""
+    if isinstance(value, dict):
+        return {key: fresh(inner) for key, inner in value.items()}
+    return [fresh(inner) for inner in value] if isinstance(value, list) else value
+
+
+def with_paths(value, files):
+    """A copy of `value` in which those texts that are among `files` are paths. Meshes stay the same objects,
+    by which arrays are told apart."""
+    if isinstance(value, dict):
+        return {key: inner if key == "mesh" else with_paths(inner, files) for key, inner in value.items()}
+    if isinstance(value, list):
+        return [with_paths(inner, files) for inner in value]
+    return pathlib.Path(value) if isinstance(value, str) and value in files else value
 
 
 def load(path, set=None):
@@ -138,9 +228,7 @@ def load(path, set=None):
     `set` is a dict of keys and values (Scene). Errors of the file and of the keys are raised as crt.Error of
     kind SCENE when the scene is first used.
     """
-    where = os.fspath(path)
-    return Scene(lambda overrides: _crt.Scene.from_file(where, overrides, tell),
-                 lambda: contextlib.nullcontext(where), (load, (os.path.abspath(where),)), set)
+    return Scene(scene_sources.File(path), set)
 
 
 def scene(source, directory=".", set=None, name="scene"):
@@ -151,33 +239,10 @@ def scene(source, directory=".", set=None, name="scene"):
     T}` with T of shape (height, width) or (height, width, 3), floats and linear, or uint8 and sRGB, top row
     first. `directory` is where files are looked up; `name` stands in messages.
     """
-    folder = Folder()
-
-    def text():
-        if isinstance(source, str):
-            return source
-        return json.dumps(plain(Arrays(folder.path).written(source)))
-
-    def read(overrides):
-        return _crt.Scene.from_text(text(), overrides, name, os.fspath(directory), tell)
-
-    @contextlib.contextmanager
-    def file():
-        with tempfile.NamedTemporaryFile("w", dir=directory, prefix=f".{name}-", suffix=".yaml",
-                                         encoding="utf-8") as written:
-            written.write(text())
-            written.flush()
-            yield written.name
-
     if not isinstance(source, str) and not isinstance(source, collections.abc.Mapping):
         raise TypeError("a scene is a dict or YAML text, or crt.load(path) for a file, and no "
                         f"{type(source).__name__}")
-
-    return Scene(read, file, (again, (source, os.path.abspath(directory), name)), set)
-
-
-def again(source, directory, name):
-    return scene(source, directory, name=name)
+    return Scene(scene_sources.Text(source, directory, name), set)
 
 
 def examples_folder():
@@ -207,12 +272,3 @@ def example(name):
         meant = f"; did you mean '{near[0]}'?" if near else f"; there are {', '.join(known)}"
         raise Error(f"no scene '{name}' comes with crt{meant}", Kind.USAGE)
     return path
-
-
-class Folder:
-    """A temporary folder, which goes with this object or with the interpreter. Textures are read from it
-    when the scene is rendered."""
-
-    def __init__(self):
-        self.path = pathlib.Path(tempfile.mkdtemp(prefix="crt-arrays-"))
-        weakref.finalize(self, shutil.rmtree, self.path, ignore_errors=True)

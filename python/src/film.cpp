@@ -63,6 +63,18 @@ crt::Image develop(const crt::Film& film, bool for_display, std::optional<double
     return film.develop({for_display, exposure_ev, std::move(aovs)});
 }
 
+nb::str describeError(const crt::ErrorEstimate& error) {
+    return nb::str(
+               "<crt.ErrorEstimate {:.3g} % ({:.3g} to {:.3g} %) expected, of this image at most {:.3g} %>")
+        .format(100 * error.relative_rmse, 100 * error.relative_rmse_lower, 100 * error.relative_rmse_upper,
+                100 * error.half_width_95);
+}
+
+nb::str describeFilm(const crt::Film& film) {
+    return nb::str("<crt.Film {} x {}, {} samples a pixel>")
+        .format(film.width(), film.height(), film.samples());
+}
+
 }  // namespace
 
 void bindFilm(nb::module_& module) {
@@ -78,11 +90,13 @@ void bindFilm(nb::module_& module) {
         .def_ro("relative_rmse_lower", &crt::ErrorEstimate::relative_rmse_lower)
         .def_ro("relative_rmse_upper", &crt::ErrorEstimate::relative_rmse_upper)
         .def_ro("half_width_95", &crt::ErrorEstimate::half_width_95)
-        .def_ro("mean_luminance", &crt::ErrorEstimate::mean_luminance);
+        .def_ro("mean_luminance", &crt::ErrorEstimate::mean_luminance)
+        .def("__repr__", &describeError);
     nb::class_<crt::Film>(module, "Film",
                           "Sums of samples: what a render gives, and what images are made of.")
         .def_static("load", &crt::Film::load, "path"_a, nb::call_guard<nb::gil_scoped_release>())
         .def("save", &crt::Film::save, "path"_a, nb::call_guard<nb::gil_scoped_release>())
+        .def("__repr__", &describeFilm)
         .def("__add__", &sumOf, "other"_a, nb::call_guard<nb::gil_scoped_release>())
         .def_prop_ro("width", &crt::Film::width)
         .def_prop_ro("height", &crt::Film::height)

@@ -40,6 +40,18 @@ std::vector<crt::Plugin> plugins(nb::object message) {
     return listening(listener, [](crt::Watch* watch) { return crt::listPlugins(watch); });
 }
 
+nb::str describeDevice(const crt::Device& device) {
+    return nb::str("<crt.Device {}: {}>").format(device.index, device.name);
+}
+
+nb::str describePlugin(const crt::Plugin& plugin) {
+    if (!plugin.reason.empty())
+        return nb::str("<crt.Plugin {}, which cannot run here: {}>").format(plugin.name, plugin.reason);
+    nb::list names;
+    for (const crt::Device& device : plugin.devices) names.append(device.name);
+    return nb::str("<crt.Plugin {} on {}>").format(plugin.name, nb::str(", ").attr("join")(names));
+}
+
 }  // namespace
 
 void bindRender(nb::module_& module) {
@@ -63,13 +75,15 @@ void bindRender(nb::module_& module) {
         .def_ro("index", &crt::Device::index)
         .def_ro("name", &crt::Device::name)
         .def_ro("driver", &crt::Device::driver)
-        .def_ro("memory_bytes", &crt::Device::memory_bytes);
+        .def_ro("memory_bytes", &crt::Device::memory_bytes)
+        .def("__repr__", &describeDevice);
     nb::class_<crt::Plugin>(module, "Plugin", "A backend, and why it cannot run here where it cannot.")
         .def_ro("name", &crt::Plugin::name)
         .def_ro("path", &crt::Plugin::path)
         .def_ro("version", &crt::Plugin::version)
         .def_ro("devices", &crt::Plugin::devices)
-        .def_ro("reason", &crt::Plugin::reason);
+        .def_ro("reason", &crt::Plugin::reason)
+        .def("__repr__", &describePlugin);
     module.def("plugins", &plugins, "message"_a.none());
     module.def("version", &crt::version);
     module.def("bits_version", &crt::bitsVersion);

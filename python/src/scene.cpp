@@ -27,11 +27,26 @@ crt::Scene fromFile(const std::string& path, const Overrides& overrides, nb::obj
     });
 }
 
+std::string composeFile(const std::string& path, const Overrides& overrides, nb::object message) {
+    Listener listener(nb::none(), nb::none(), std::move(message));
+    return listening(listener, [&](crt::Watch* watch) {
+        return crt::Scene::composeFile(path, overridesOf(overrides), watch);
+    });
+}
+
 crt::Scene fromText(const std::string& yaml, const Overrides& overrides, const std::string& name,
                     const std::string& directory, nb::object message) {
     Listener listener(nb::none(), nb::none(), std::move(message));
     return listening(listener, [&](crt::Watch* watch) {
         return crt::Scene::fromText(yaml, overridesOf(overrides), watch, name, directory);
+    });
+}
+
+std::string composeText(const std::string& yaml, const Overrides& overrides, const std::string& name,
+                        const std::string& directory, nb::object message) {
+    Listener listener(nb::none(), nb::none(), std::move(message));
+    return listening(listener, [&](crt::Watch* watch) {
+        return crt::Scene::composeText(yaml, overridesOf(overrides), watch, name, directory);
     });
 }
 
@@ -41,6 +56,9 @@ void bindScene(nb::module_& module) {
     nb::class_<crt::Scene>(module, "Scene", "A scene that has been read and checked. It never changes.")
         .def_static("from_file", &fromFile, "path"_a, "overrides"_a, "message"_a.none())
         .def_static("from_text", &fromText, "yaml"_a, "overrides"_a, "name"_a, "directory"_a,
+                    "message"_a.none())
+        .def_static("compose_file", &composeFile, "path"_a, "overrides"_a, "message"_a.none())
+        .def_static("compose_text", &composeText, "yaml"_a, "overrides"_a, "name"_a, "directory"_a,
                     "message"_a.none())
         .def_prop_ro("title", &crt::Scene::title)
         .def_prop_ro("width", &crt::Scene::width)

@@ -17,7 +17,7 @@ SIZE = {"film.resolution": [96, 64], "sampler.type": "independent"}
 
 @pytest.fixture(scope="module")
 def oidn():
-    """The libraries of crt[denoise]; OpenEXR."""
+    """The libraries that denoising needs; OpenEXR."""
     pytest.importorskip("pyoidn", reason="pyoidn is not installed")
     return pytest.importorskip("OpenEXR", reason="OpenEXR is not installed")
 
@@ -45,6 +45,19 @@ def test_it_is_nearer_to_the_converged_image(oidn, converged, seed):
     assert guided.image.min() >= 0 and guided.image.max() > 1.05, "linear, and not cut at 1"
     assert guided.image.mean() == pytest.approx(result.image.mean(), rel=ENERGY)
     assert np.array_equal(before, result.image)
+
+
+def test_a_spectral_film_is_denoised_like_any_other(oidn, converged, tmp_path):
+    """Its bins are no guides, and they are not in the denoised file."""
+    bins = {"film.spectral": {"from_nm": 400, "to_nm": 700, "bins": 6}}
+    result = crt.render(crt.scene(AOVS, set={**SIZE, **bins}), spp=8)
+    denoised = crt.denoise(result)
+    assert denoised.image.shape == (64, 96, 3) and "with albedo and normal" in denoised.made_with
+    assert rmse(denoised.image, converged) < MARGIN * rmse(result.image[..., :3], converged)
+    denoised.save(tmp_path / "a.exr")
+    header = oidn.File(str(tmp_path / "a.exr")).header()
+    assert "spectralLayoutVersion" not in header and "emissiveUnits" not in header
+    assert crt.Image.load(str(tmp_path / "a.exr")).channels == ["R", "G", "B"]
 
 
 def test_files_say_that_they_are_denoised(oidn, tmp_path):
@@ -107,7 +120,7 @@ def test_what_cannot_be_done_is_said(oidn, tmp_path, box):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_without_the_library_it_names_the_extra(monkeypatch, box):
+def test_without_the_libraries_it_names_them(monkeypatch, box):
     monkeypatch.setitem(sys.modules, "pyoidn", None)
-    with pytest.raises(crt.Error, match=r"pip install 'crt\[denoise\]'"):
+    with pytest.raises(crt.Error, match=r"pip install pyoidn OpenEXR"):
         crt.denoise(crt.render(box, spp=4))

@@ -9,7 +9,7 @@ import pytest
 from imports import rendered, written
 
 import crt
-from crt.importers import writer
+from crt import writing
 
 MANY = " ".join(f"{x} {y} 0" for y in range(41) for x in range(41))
 FACES = " ".join(f"{41 * y + x} {41 * y + x + 1} {41 * y + x + 42}" for y in range(40) for x in range(40))
@@ -100,4 +100,4 @@ def test_other_files_are_refused():
      '{"a b": 1, c: [true, null, "yes", "1e3", plain]}'),
     (1e20, "1e+20"), (0.1, "0.1"), ('"', '"\\""')])
 def test_yaml_keeps_what_is_text(value, text):
-    assert writer.text_of(value) == text
+    assert writing.text_of(value) == text

@@ -101,6 +101,32 @@ def test_aovs(box):
     assert crt.render(crt.scene(BOX), spp=4, backend="embree").aovs == {}
 
 
+SPECTRAL = {"film.spectral": {"from_nm": 400, "to_nm": 700, "bins": 6},
+            "film.responses": {"eye": {"table": {"nm": [400, 550, 700], "value": [0, 1, 0]},
+                                       "outside": "zero"}}}
+SHAPES = {"albedo": (16, 24, 3), "normal": (16, 24, 3), "depth": (16, 24), "primitive": (16, 24),
+          "variance": (16, 24), "samples": (16, 24), "error": (16, 24)}
+
+
+@pytest.mark.parametrize("film", [{}, SPECTRAL])
+def test_aovs_have_channels_of_their_own(film, tmp_path):
+    settings = {**film, "outputs": [{"file": "unused.exr", "aovs": list(SHAPES)}]}
+    result = crt.render(crt.scene(BOX, set=settings), spp=16, backend="embree")
+    assert {name: plane.shape for name, plane in result.aovs.items()} == SHAPES
+    whole = {name: plane.dtype for name, plane in result.aovs.items() if plane.dtype != np.float32}
+    assert whole == {"primitive": np.uint32, "samples": np.uint32}
+    assert (result.aovs["samples"] == 16).all() and len(np.unique(result.aovs["primitive"])) > 2
+    result.save(tmp_path / "a.exr")
+    saved = crt.Image.load(str(tmp_path / "a.exr"))
+    named = {"albedo": "Albedo.", "normal": "Ns.", "depth": "Z", "variance": "Variance.",
+             "error": "StdError."}
+    for name, start in named.items():
+        own = [i for i, channel in enumerate(saved.channels) if channel.startswith(start)]
+        planes = [saved.pixels[..., own].reshape(SHAPES[name]), result.aovs[name]]
+        assert same(*map(np.ascontiguousarray, planes)), name
+    assert result.image.shape == (16, 24, 10 if film else 3)
+
+
 def test_notebook_picture(box, tmp_path):
     result = crt.render(box, spp=16, backend="embree")
     (tmp_path / "a.png").write_bytes(result._repr_png_())

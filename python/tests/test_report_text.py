@@ -4,8 +4,8 @@ import math
 
 import pytest
 
-pytest.importorskip("jinja2", reason="the pages of reports need jinja2 (pip install 'crt[report]')")
-pytest.importorskip("matplotlib", reason="the pages of reports need matplotlib (pip install 'crt[report]')")
+pytest.importorskip("jinja2", reason="the pages of reports need jinja2 (pip install jinja2)")
+pytest.importorskip("matplotlib", reason="the pages of reports need matplotlib (pip install matplotlib)")
 
 from crt.report import figures, plots, text  # noqa: E402
 

@@ -1,5 +1,5 @@
-"""The site that was built: every link within it leads to a file and, where it names one, to an anchor; and
-no page loads anything from elsewhere."""
+"""The site that was built: every link within it leads to a file and, where it names one, to an anchor; no
+page loads anything from elsewhere; and search has its files."""
 
 import html.parser
 import pathlib
@@ -7,6 +7,8 @@ import sys
 import urllib.parse
 
 LOADS = {("script", "src"), ("img", "src"), ("source", "src"), ("iframe", "src"), ("video", "src")}
+# What search needs in pages that are opened as files.
+SEARCH = ("assets/iframe-worker.js", "search/search_index.js")
 LOADED_LINKS = ("stylesheet", "icon", "preload")
 
 
@@ -53,6 +55,7 @@ def check(site):
                 wrong.append(f"{where}:{line}: {target}: there is no {name}")
             elif fragment and place in pages and fragment not in pages[place].anchors:
                 wrong.append(f"{where}:{line}: {target}: there is no such anchor")
+    wrong += [f"{name} is missing, which search needs" for name in SEARCH if not (site / name).is_file()]
     for sheet in site.rglob("*.css"):
         text = sheet.read_text("utf-8", errors="replace")
         bare = text.replace('"', "").replace("'", "")

@@ -65,7 +65,7 @@ def add_documents(site, program):
     for page in sorted((HERE / "pages").iterdir()):
         site.write(page.name.removesuffix(".in"), page.read_text("utf-8"))
     (site.docs / "assets").mkdir(exist_ok=True)
-    for name in ("favicon.svg", "extra.css"):
+    for name in ("favicon.svg", "extra.css", "iframe-worker.js"):
         shutil.copyfile(HERE / name, site.docs / "assets" / name)
     return decisions
 
@@ -143,9 +143,11 @@ def navigation(site, decisions):
     titled = [{title(file.read_text("utf-8")).replace(": ", " ", 1): f"decisions/{file.name}"}
               for file in decisions]
     return [{"crt": ["index.md"]}, {"Gallery": "gallery.md"},
-            {"Manual": [{"Scene files": "scene.md"}, {"Errors of images": "error.md"},
-                        {"Python": "python.md"}, {"libcrt": "embedding.md"},
-                        {"A backend": "example_backend.md"},
+            {"Manual": [{"Install": "install.md"}, {"Getting started": "start.md"},
+                        {"Scene files": "scene.md"}, {"Live view": "view.md"},
+                        {"Errors of images": "error.md"}, {"Python": "python.md"},
+                        {"Scenes of Mitsuba and pbrt": "import.md"}, {"Many machines": "cluster.md"},
+                        {"libcrt": "embedding.md"}, {"A backend": "example_backend.md"},
                         {"When things fail": "faults.md"}]},
             {"Notebooks": pages("notebooks")},
             {"API": [{"Python": "python-api.md"}, {"C and C++": "cpp.md"}]},
@@ -181,7 +183,7 @@ def main(build, work, output):
     mkdocstrings = {"handlers": {"python": {"paths": [str(python)], "options": options}}}
     settings = {"INHERIT": str(HERE / "mkdocs.yml"), "docs_dir": str(docs), "site_dir": str(output),
                 "nav": navigation(site, decisions),
-                "plugins": ["search", {"mkdocstrings": mkdocstrings}]}
+                "plugins": ["search", "offline", {"mkdocstrings": mkdocstrings}]}
     (work / "mkdocs.yml").write_text(json.dumps(settings, indent=1))
     say("MkDocs")
     environment = {**os.environ, "NO_MKDOCS_2_WARNING": "1", "DISABLE_MKDOCS_2_WARNING": "true"}

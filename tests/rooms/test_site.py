@@ -11,6 +11,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "scripts/site"))
 sys.dont_write_bytecode = True
 import check_site  # noqa: E402
+import make  # noqa: E402
 import stage  # noqa: E402
 
 
@@ -62,17 +63,40 @@ class Stage(unittest.TestCase):
         self.assertEqual(list(stage.spaced(code)), code)
 
 
+class Navigation(unittest.TestCase):
+    def test_every_page_of_the_manual_is_in_it(self):
+        with tempfile.TemporaryDirectory() as folder:
+            site = stage.Stage(pathlib.Path(folder))
+            pages = set(leaves(make.navigation(site, [])))
+            expected = {site.page_of(file) for file in [ROOT / name for name in stage.PAGES]
+                        + sorted((ROOT / "docs").glob("*.md"))}
+        self.assertEqual(expected - pages, set())
+
+
+def leaves(tree):
+    """The texts in lists and in values of dicts."""
+    if isinstance(tree, str):
+        yield tree
+    else:
+        for inner in tree.values() if isinstance(tree, dict) else tree:
+            yield from leaves(inner)
+
+
 class Site(unittest.TestCase):
     GOOD = ("<link rel='canonical' href='https://a.org/x'><a href='b.html#x'></a><a href='#y'></a>"
             "<a href='https://a.org'></a><p id='y'></p><img src='p.png'>")
 
-    def wrong(self, more, sheet=""):
+    def wrong(self, more, sheet="", lacks=None):
         with tempfile.TemporaryDirectory() as name:
             site = pathlib.Path(name).resolve()
             (site / "a.html").write_text(self.GOOD + more)
             (site / "b.html").write_text("<a name='x'></a>")
             (site / "p.png").write_text("")
             (site / "s.css").write_text(sheet)
+            for name in check_site.SEARCH:
+                if name != lacks:
+                    (site / name).parent.mkdir(exist_ok=True)
+                    (site / name).write_text("")
             return check_site.check(site)[0]
 
     def test_what_is_right(self):
@@ -86,6 +110,8 @@ class Site(unittest.TestCase):
             self.assertEqual(len(self.wrong(more)), 1, more)
         for sheet in ("a { background: url('https://a.org/p.png') }", "@import 'x.css';"):
             self.assertEqual(len(self.wrong("", sheet)), 1, sheet)
+        for name in check_site.SEARCH:
+            self.assertEqual(len(self.wrong("", lacks=name)), 1, name)
 
 
 if __name__ == "__main__":

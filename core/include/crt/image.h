@@ -11,7 +11,8 @@
 
 CRT_API_NAMESPACE_BEGIN
 
-/// Named planes of floats, with what image files keep beside them: primaries, the window, metadata.
+/// Named planes of floats and of integers, with what image files keep beside them: primaries, the window,
+/// metadata.
 class CRT_API Image {
 public:
     /// PFM, PPM, EXR, PNG or Radiance HDR, by content; values are linear. Throws crt::Error of kind Usage.
@@ -35,6 +36,10 @@ public:
     const std::vector<float>& pixels() const;
     /// [height][width] of one channel. Throws crt::Error of kind Usage where there is none of that name.
     std::vector<float> plane(const std::string& channel) const;
+    /// Planes that count or number, such as "sampleCount" and "id.primitive".
+    const std::vector<std::string>& integerChannels() const;
+    /// [height][width][integerChannels], top row first.
+    const std::vector<std::uint32_t>& integers() const;
 
     struct Impl;
     /// For libcrt itself.

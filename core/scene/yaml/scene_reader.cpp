@@ -450,17 +450,27 @@ std::string SceneFiles::directoryOf(const YamlPlace& place) const {
 }
 
 std::optional<std::string> SceneFiles::locate(const std::string& name, const YamlPlace& place,
-                                              Diagnostics& out) const {
+                                              Diagnostics& out) {
     const fs::path wanted(name);
-    if (wanted.is_absolute()) return locateIn({wanted.root_path()}, wanted, place, out);
+    if (wanted.is_absolute()) return noted(locateIn({wanted.root_path()}, wanted, place, out), place);
     std::vector<fs::path> directories{directoryOf(place)};
     for (std::string& d : meshDirectories()) directories.emplace_back(std::move(d));
-    return locateIn(directories, wanted, place, out);
+    return noted(locateIn(directories, wanted, place, out), place);
 }
 
 std::optional<std::string> SceneFiles::locateBeside(const std::string& name, const YamlPlace& place,
-                                                    Diagnostics& out) const {
-    return locateIn({directoryOf(place)}, name, place, out);
+                                                    Diagnostics& out) {
+    return noted(locateIn({directoryOf(place)}, name, place, out), place);
+}
+
+std::optional<std::string> SceneFiles::noted(std::optional<std::string> path, const YamlPlace& place) {
+    if (path) located_[{place.source, place.line, place.column}] = *path;
+    return path;
+}
+
+const std::string* SceneFiles::pathAt(const YamlPlace& place) const {
+    const auto found = located_.find({place.source, place.line, place.column});
+    return found == located_.end() ? nullptr : &found->second;
 }
 
 void SceneFiles::note(const std::string& path) {

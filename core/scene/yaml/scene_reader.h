@@ -8,9 +8,11 @@
 #include "spectra/spectra.h"
 
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -123,20 +125,26 @@ public:
 
     /// The path of a readable file: beside the file that names it, then in the mesh directories. Reports an
     /// error at `place` when there is none.
-    std::optional<std::string> locate(const std::string& name, const YamlPlace& place,
-                                      Diagnostics& out) const;
+    std::optional<std::string> locate(const std::string& name, const YamlPlace& place, Diagnostics& out);
     /// The same of a file that can only be beside the one that names it.
     std::optional<std::string> locateBeside(const std::string& name, const YamlPlace& place,
-                                            Diagnostics& out) const;
+                                            Diagnostics& out);
+    /// What was found for the name at `place`; null where no file was looked for.
+    const std::string* pathAt(const YamlPlace& place) const;
     /// Notes that a file went into the scene; every file once.
     void note(const std::string& path);
     const std::vector<std::string>& read() const { return read_; }
 
 private:
+    /// By source, line and column of the name.
+    using Located = std::map<std::tuple<const YamlSource*, int, int>, std::string>;
+
     std::string directoryOf(const YamlPlace& place) const;
+    std::optional<std::string> noted(std::optional<std::string> path, const YamlPlace& place);
 
     std::string directory_;
     std::vector<std::string> read_;
+    Located located_;
 };
 
 /// The sentence of an error from a file reader, led by the file's own line where that is known.

@@ -5,6 +5,7 @@
 #include "base/log.h"
 #include "scene/import/import.h"
 #include "scene/scene_limits.h"
+#include "scene/yaml/composed_text.h"
 #include "scene/yaml/scene_environment.h"
 #include "scene/yaml/scene_include.h"
 #include "scene/yaml/scene_lights.h"
@@ -378,10 +379,10 @@ void readScene(const YamlNode& root, Diagnostics& out, SceneFiles& files, GltfFi
     if (!out.failed()) objects.finish();
 }
 
-/// `path` is the file of the scene; empty for text of another origin.
+/// `path` is the file of the scene; empty for text of another origin. `composed` may be null.
 Scene parse(const std::string& yaml, const std::string& name, const std::string& path,
-            const std::vector<SceneOverride>& overrides, SceneFiles files, GltfFiles gltf = {},
-            std::unique_ptr<LoadedMesh> model_mesh = {}) {
+            const std::vector<SceneOverride>& overrides, std::string* composed, SceneFiles files,
+            GltfFiles gltf = {}, std::unique_ptr<LoadedMesh> model_mesh = {}) {
     const auto start = std::chrono::steady_clock::now();
     Scene scene;
     scene.file = name;
@@ -392,6 +393,7 @@ Scene parse(const std::string& yaml, const std::string& name, const std::string&
     if (YamlNodePtr root = includes.read(name, yaml, path)) {
         applyOverrides(root, overrides, override_sources, out);
         readScene(*root, out, files, gltf, std::move(model_mesh), scene);
+        if (composed != nullptr && !out.failed()) *composed = composedText(*root, files);
     }
     out.throwIfFailed();
     checkRadiance(scene);
@@ -443,14 +445,15 @@ SceneOverride parseOverride(const std::string& text) {
     return {text.substr(0, equals), text.substr(equals + 1)};
 }
 
-Scene loadScene(const std::string& path, const std::vector<SceneOverride>& overrides) {
+Scene loadScene(const std::string& path, const std::vector<SceneOverride>& overrides,
+                std::string* composed) {
     if (isModel(path)) {
         const auto start = std::chrono::steady_clock::now();
         GltfFiles gltf;
         ImportedModel model = importModel(gltf, path);
         SceneFiles files(std::filesystem::path(path).parent_path().string());
         files.note(path);
-        Scene scene = parse(model.scene, path, {}, overrides, std::move(files), std::move(gltf),
+        Scene scene = parse(model.scene, path, {}, overrides, composed, std::move(files), std::move(gltf),
                             std::move(model.mesh));
         const std::chrono::duration<double> passed = std::chrono::steady_clock::now() - start;
         scene.parse_seconds = passed.count();
@@ -465,14 +468,14 @@ Scene loadScene(const std::string& path, const std::vector<SceneOverride>& overr
     SceneFiles files(std::filesystem::path(path).parent_path().string());
     if (path != kStandardInput) files.note(path);
     const std::string file = path == kStandardInput ? std::string() : path;
-    Scene scene = parse(text, nameOf(path), file, overrides, std::move(files));
+    Scene scene = parse(text, nameOf(path), file, overrides, composed, std::move(files));
     if (scene.files_read.empty()) scene.input_bytes = text.size();
     return scene;
 }
 
 Scene parseScene(const std::string& yaml, const std::string& name, const std::string& directory,
-                 const std::vector<SceneOverride>& overrides) {
-    return parse(yaml, name, {}, overrides, SceneFiles(directory));
+                 const std::vector<SceneOverride>& overrides, std::string* composed) {
+    return parse(yaml, name, {}, overrides, composed, SceneFiles(directory));
 }
 
 }  // namespace crt

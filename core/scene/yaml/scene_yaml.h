@@ -24,11 +24,13 @@ SceneOverride parseOverride(const std::string& text);
 /// share/crt/meshes beside the installed program).
 /// A model (.glb, .gltf, .obj) is read as the scene that `crt import` writes of it.
 /// "-" is standard input, which is beside the current directory.
-Scene loadScene(const std::string& path, const std::vector<SceneOverride>& overrides = {});
+/// `composed` gets the text of it all (composed_text.h), unless it is null.
+Scene loadScene(const std::string& path, const std::vector<SceneOverride>& overrides = {},
+                std::string* composed = nullptr);
 
 /// The same from text; `name` stands in messages, `directory` is where relative files are looked up.
 Scene parseScene(const std::string& yaml, const std::string& name, const std::string& directory,
-                 const std::vector<SceneOverride>& overrides = {});
+                 const std::vector<SceneOverride>& overrides = {}, std::string* composed = nullptr);
 
 /// JSON Schema, draft-07, of scene files (`crt schema`).
 std::string sceneJsonSchema();

@@ -6,8 +6,8 @@ import pathlib
 
 from ..errors import Error, Kind
 from ..scenes import Scene, scene
+from ..writing import relative
 from .losses import reading, refuse_infinite
-from .writer import relative
 
 ENDINGS = (".xml", ".pbrt", ".pbrt.gz")
 

@@ -4,9 +4,9 @@ import argparse
 import os
 import sys
 
-from .. import program
+from .. import program, writing
 from ..errors import Error, Kind
-from . import import_scene, is_foreign, writer
+from . import import_scene, is_foreign
 
 
 def parser():
@@ -42,9 +42,9 @@ def main(arguments):
         remarks += ["Features that crt does not have, where each occurs first, and what it uses instead:",
                     *(f"  {loss}".replace("\n", " ") for loss in made.losses)]
     if given.output == "-":
-        sys.stdout.write(writer.to_text(made.content, remarks))
+        sys.stdout.write(writing.to_text(made.content, remarks))
     else:
-        writer.to_file(made.content, remarks, given.output, given.overwrite)
+        writing.to_file(made.content, remarks, given.output, given.overwrite)
     report(made.losses)
     return 0
 

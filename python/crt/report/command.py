@@ -48,7 +48,8 @@ def page_of(run):
         from . import converge, verify
     except ImportError as missing:
         raise Refused(f"pages need the library {missing.name}, which is not installed: "
-                      "pip install 'crt[report]', or jinja2 and matplotlib") from None
+                      "pip install jinja2 matplotlib (on Debian and Ubuntu: apt install python3-jinja2 "
+                      "python3-matplotlib)") from None
     try:
         return {"converge": converge, "verify": verify}[run.kind].page(run)
     except (KeyError, TypeError, ValueError, AttributeError, IndexError, ZeroDivisionError) as wrong:

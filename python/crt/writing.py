@@ -7,9 +7,8 @@ import re
 import shutil
 import tempfile
 
-from ..arrays import Arrays
-from ..errors import Error, Kind
-from ..scenes import plain
+from .arrays import Arrays, plain
+from .errors import Error, Kind
 
 PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
 # Words of YAML that are no text unless in quotes.
@@ -24,7 +23,8 @@ def text_of(value):
     if isinstance(value, list):
         return "[" + ", ".join(map(text_of, value)) + "]"
     if isinstance(value, str):
-        return value if PLAIN.fullmatch(value) and value.lower() not in WORDS else json.dumps(value)
+        is_plain = PLAIN.fullmatch(value) and value.lower() not in WORDS
+        return value if is_plain else json.dumps(value, ensure_ascii=False)
     if isinstance(value, float):
         return repr(int(value)) if value == int(value) and abs(value) < 1e15 else repr(value)
     return json.dumps(value)
@@ -91,8 +91,8 @@ def to_text(content, remarks):
     """The scene with its meshes written out, for where there is no folder to put files into."""
     content = relative(content, pathlib.Path.cwd())
     if has_image(content):
-        raise Error("the scene has images that crt needs as files of its own; name the scene with -o",
-                    Kind.USAGE)
+        raise Error("the scene holds images, which crt reads from files of their own: write the scene to a "
+                    "file (crt import: -o FILE; Python: scene.save)", Kind.USAGE)
     return yaml(plain(content), remarks)
 
 
@@ -104,8 +104,8 @@ def to_file(content, remarks, path, overwrite):
     beside = path.with_name(path.stem + ".meshes")
     for there in (path, beside):
         if there.exists() and not overwrite:
-            raise Error(f"'{there}' is there already, and may have been changed by hand; --overwrite "
-                        "replaces it", Kind.USAGE)
+            raise Error(f"'{there}' exists already, and may have been changed by hand; --overwrite (Python: "
+                        "overwrite=True) replaces it", Kind.USAGE)
     try:
         with tempfile.TemporaryDirectory(prefix=f".{path.stem}-", dir=path.parent) as folder:
             files, scene = pathlib.Path(folder, "files"), pathlib.Path(folder, "scene")
