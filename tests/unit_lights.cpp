@@ -4,6 +4,7 @@
 #include "base/temporary_folder.h"
 #include "captured_log.h"
 #include "kernel_test.h"
+#include "scene/light_units.h"
 #include "scene/solar_position.h"
 #include "scene/yaml/scene_yaml.h"
 
