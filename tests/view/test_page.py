@@ -67,9 +67,12 @@ class Picture(PageTest):
         page = self.open()
         self.wait(page, DONE)
         page.locator("#canvas").focus()
-        page.keyboard.press("]")
+        release = self.hold(page, "**/change?*")
         with page.expect_download() as download:
+            page.keyboard.press("]")
             page.keyboard.press("p")
+            page.wait_for_timeout(300)
+            release()
         self.assertEqual(download.value.suggested_filename, "scene_16spp.png")
         self.wait(page, f"view.status.exposure_ev > 0 && {DONE}")
         self.assertEqual(b"".join(png_pixels(download.value.path())), self.pixels(page))
