@@ -4,6 +4,7 @@
 #include "base/temporary_folder.h"
 #include "captured_log.h"
 #include "kernel_test.h"
+#include "scene/light_units.h"
 #include "scene/solar_position.h"
 #include "scene/yaml/scene_yaml.h"
 
@@ -48,6 +49,7 @@ double lumens(const crt::Spectrum& s) {
 }  // namespace
 
 TEST_CASE("how bright a light is says one key, in its unit", "[lights]") {
+    CHECK(crt::luminanceOfUnitY_cd_m2() == Approx(lumens(crt::constantSpectrum(1))));
     const PointLight spectral = read("{type: point, position: [1, 2, 3], radiant_intensity: 5}");
     CHECK(spectral.strength * spectral.spectrum[7] == Approx(5));
     CHECK(spectral.position == crt::Vec3d{1, 2, 3});

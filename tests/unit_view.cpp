@@ -12,6 +12,7 @@
 #include "view/http_server.h"
 #include "view/messages.h"
 #include "view/pace.h"
+#include "view/page_changes.h"
 #include "view/primitive_names.h"
 #include "view/scene_source.h"
 #include "view/tev_sender.h"
@@ -101,9 +102,11 @@ TEST_CASE("a pan moves what is at the target's distance with the hand", "[view]"
     crt::Camera camera;
     camera.tan_half_width = 0.8;
     camera.tan_half_height = 0.45;
-    camera = crt::withPose(camera, somePose());
+    CameraPose start = somePose();
+    start.tan_half_fov = 0.45;
+    camera = crt::withPose(camera, start);
     const Vec3d point = camera.target;
-    CameraPose pose = somePose();
+    CameraPose pose = crt::poseOf(camera);
     crt::pan(pose, camera, 0.25, 0.1);
     const auto shown = shownAt(crt::withPose(camera, pose), point);
     REQUIRE(shown[0] == Approx(0.75));
@@ -116,6 +119,30 @@ TEST_CASE("a dolly multiplies the distance to the target", "[view]") {
     crt::dolly(pose, 0.5);
     requireNear(pose.position, {2, 2.5, -2});
     requireNear(pose.target, somePose().target);
+}
+
+TEST_CASE("the field of view is the angle across the shorter side, and keeps the image's shape", "[view]") {
+    crt::Camera camera;
+    camera.tan_half_width = 1.6 * 0.45;
+    camera.tan_half_height = 0.45;
+    CameraPose pose = crt::poseOf(camera);
+    CHECK(crt::fovOf_deg(pose) == Approx(2 * std::atan(0.45) * 180 / std::numbers::pi));
+    // The scene's own angle leaves its camera as it is, to the bit.
+    CHECK(crt::withPose(camera, pose).tan_half_width == camera.tan_half_width);
+    crt::setFov(pose, camera, 90);
+    CHECK(crt::withPose(camera, pose).tan_half_height == Approx(1));
+    CHECK(crt::withPose(camera, pose).tan_half_width == Approx(1.6));
+    crt::zoom(pose, camera, 2);
+    CHECK(crt::withPose(camera, pose).tan_half_height == Approx(0.5));
+    for (int i = 0; i < 100; ++i) crt::zoom(pose, camera, 100);
+    CHECK(crt::fovOf_deg(pose) == Approx(crt::kLeastFov_deg));
+    for (int i = 0; i < 100; ++i) crt::zoom(pose, camera, 0.01);
+    CHECK(crt::fovOf_deg(pose) == Approx(crt::kMostFov_deg));
+    // A scene may have a narrower one.
+    camera.tan_half_width = camera.tan_half_height = 1e-6;
+    pose = crt::poseOf(camera);
+    crt::zoom(pose, camera, 2);
+    CHECK(pose.tan_half_fov == 1e-6);
 }
 
 TEST_CASE("the depth of what a ray meets is measured along the axis", "[view]") {
@@ -280,27 +307,63 @@ TEST_CASE("who does not know the token, or comes from elsewhere, is refused", "[
 }
 
 TEST_CASE("what pages ask for is read, or refused by name", "[view]") {
-    const crt::ViewChange change = crt::readChange(
-        R"({"orbit": [0.5, -1], "dolly": 2, "samples": 16, "white": "D50", "paused": true})");
+    const auto only = [](const char* text) {
+        const auto changes = crt::readChanges(text);
+        REQUIRE(changes.size() == 1);
+        return changes[0];
+    };
+    const crt::ViewChange change =
+        only(R"({"orbit": [0.5, -1], "dolly": 2, "samples": 16, "white": "D50", "paused": true})").change;
     CHECK((*change.orbit)[1] == -1);
     CHECK(change.dolly == 2);
     CHECK(change.samples == 16u);
     CHECK(change.white == "D50");
     CHECK(change.paused == true);
     CHECK_FALSE(change.pan);
+    for (const char* text : {"", "1", "{"}) CHECK_THROWS_AS(crt::readChanges(text), crt::Error);
     for (const char* text :
-         {"", "[]", "{\"orbit\": 1}", "{\"orbit\": [1, \"x\"]}", "{\"dolly\": 0}", "{\"dolly\": 1e99}",
-          "{\"samples\": 0}", "{\"paused\": 1}", "{\"exposure_ev\": null}", "{\"focus\": [2, 0]}"})
-        CHECK_THROWS_AS(crt::readChange(text), crt::Error);
-    CHECK_THROWS_WITH(crt::readChange("{\"orbitt\": [0, 0]}"), Contains("did you mean 'orbit'?"));
+         {"[[]]", "[1]", "{\"orbit\": 1}", "{\"orbit\": [1, \"x\"]}", "{\"dolly\": 0}", "{\"dolly\": 1e99}",
+          "{\"samples\": 0}", "{\"paused\": 1}", "{\"exposure_ev\": null}", "{\"focus\": [2, 0]}",
+          "{\"fov_deg\": 180}", "{\"zoom\": 0}", "{\"exposure_step\": 101}", "{\"toggle_paused\": 1}"})
+        CHECK_FALSE(only(text).refusal.empty());
+    CHECK_THAT(only("{\"orbitt\": [0, 0]}").refusal, Contains("did you mean 'orbit'?"));
+}
+
+TEST_CASE("a change that cannot be read leaves those beside it as they are", "[view]") {
+    const auto changes = crt::readChanges(R"([{"dolly": 2}, {"dolly": 0}, {"pan": [0, 1]}])");
+    REQUIRE(changes.size() == 3);
+    CHECK(changes[0].change.dolly == 2);
+    CHECK_FALSE(changes[1].refusal.empty());
+    CHECK(changes[2].change.pan);
+    CHECK(changes[2].refusal.empty());
+    CHECK(crt::readChanges("[]").empty());
+}
+
+TEST_CASE("a page's change counts once, however often it is sent", "[view]") {
+    crt::PageChanges taken;
+    for (const std::uint64_t number : {1, 2, 3}) CHECK(taken.take("a", number));
+    for (const std::uint64_t number : {1, 2, 3}) CHECK_FALSE(taken.take("a", number));
+    CHECK(taken.take("b", 1));
+    CHECK(taken.take("a", 4));
+    // A page that goes on is not forgotten for many that came once.
+    for (std::uint64_t i = 0; i < 1000; ++i) {
+        CHECK(taken.take("once " + std::to_string(i), 1));
+        CHECK(taken.take("a", 5 + i));
+        CHECK_FALSE(taken.take("a", 5 + i));
+    }
 }
 
 TEST_CASE("the camera's YAML is read back as that camera", "[view]") {
-    const CameraPose pose{{1.5, -2.25, 1e-3}, {0, 0.125, 300}, {0, 0, 1}, 12.5};
-    const std::string yaml = crt::cameraYaml(pose, true);
-    const Scene scene = parse(yaml + "  fov: 40\n  aperture_radius: 0.1\n");
-    CHECK(crt::poseOf(scene.camera) == pose);
-    CHECK(crt::cameraYaml(pose, false).find("focus") == std::string::npos);
+    CameraPose pose{{1.5, -2.25, 1e-3}, {0, 0.125, 300}, {0, 0, 1}, 12.5};
+    pose.tan_half_fov = std::tan(20 * std::numbers::pi / 180);
+    const std::string yaml = crt::cameraYaml(pose, true, true);
+    const Scene scene = parse(yaml + "  aperture_radius: 0.1\n");
+    CHECK(crt::fovOf_deg(crt::poseOf(scene.camera)) == Approx(40));
+    CameraPose read = crt::poseOf(scene.camera);
+    read.tan_half_fov = pose.tan_half_fov;
+    CHECK(read == pose);
+    for (const char* key : {"focus", "fov"})
+        CHECK(crt::cameraYaml(pose, false, false).find(key) == std::string::npos);
 }
 
 TEST_CASE("packets for tev have its layout", "[view]") {

@@ -9,6 +9,9 @@ namespace crt {
 /// the tabulated ȳ(λ) (CIE 15:2018, 7.1).
 inline constexpr double kLuminousEfficacy_lm_W = 683.002;
 
+/// Luminance of a film's value Y of 1, cd/m²: Y is ∫L ȳ dλ / ∫ȳ dλ, a mean spectral radiance.
+double luminanceOfUnitY_cd_m2();
+
 /// Photometric value of a spectral quantity: lumens of W·nm⁻¹, lux of W·m⁻²·nm⁻¹.
 double photometric(const Spectrum& spectral);
 

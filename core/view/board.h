@@ -3,6 +3,7 @@
 
 #include "view/camera_moves.h"
 
+#include <array>
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
@@ -15,6 +16,15 @@
 
 namespace crt {
 
+/// What the colours of a picture stand for: a bar of colours with numbers at its ends.
+struct ColourScale {
+    std::string name{};        ///< What it is of; empty: the legend says it.
+    double low = 0, high = 1;  ///< Values beyond them have the colours of the ends.
+    std::string unit{};        ///< Empty: a pure number.
+    bool logarithmic = false;
+    std::vector<std::array<std::uint8_t, 3>> colours{};  ///< At equal distances, from low to high.
+};
+
 /// Eight-bit colours for a screen.
 struct Picture {
     std::uint64_t number = 0;  ///< Given by the Board.
@@ -22,9 +32,11 @@ struct Picture {
     std::vector<std::uint8_t> rgba;  ///< [height][width][4], top row first.
     std::uint64_t samples = 0;       ///< Per pixel.
     unsigned divisor = 1;            ///< As of Snapshot.
+    std::uint64_t run = 0;           ///< As of Snapshot.
     CameraPose pose;                 ///< From where.
     std::string plane;               ///< What it shows (planes.h).
     std::string legend;              ///< What its colours stand for; empty: they are colours.
+    std::vector<ColourScale> scales;
 };
 
 /// An error of the image, known at some time of the render.
@@ -34,6 +46,7 @@ struct ErrorPoint {
 
 /// What there is to say beside the picture.
 struct Status {
+    std::string program;  ///< Another one each time that crt view starts.
     std::string file, title;
     std::string stage;  ///< Long work before samples: "reading bunny.obj". Empty: none.
     std::string
@@ -47,7 +60,7 @@ struct Status {
     bool paused = false;
     bool has_lens = false;
     CameraPose pose;
-    bool pose_moved = false;
+    bool pose_moved = false, fov_moved = false;
     double exposure_ev = 0;
     std::string white;
     std::vector<std::string> whites;  ///< That can be chosen.

@@ -17,10 +17,20 @@ Vec3d rotated(const Vec3d& v, const Vec3d& axis, double angle) {
     return v * c + cross(axis, v) * s + axis * (dot(axis, v) * (1 - c));
 }
 
+double shorterSide(const Camera& camera) { return std::min(camera.tan_half_width, camera.tan_half_height); }
+
+double tanOfHalf(double degrees) { return std::tan(degrees * (std::numbers::pi / 360)); }
+
+void setTanHalfFov(CameraPose& pose, const Camera& camera, double wanted) {
+    const double own = shorterSide(camera);
+    pose.tan_half_fov = std::clamp(wanted, std::min(own, tanOfHalf(kLeastFov_deg)),
+                                   std::max(own, tanOfHalf(kMostFov_deg)));
+}
+
 }  // namespace
 
 CameraPose poseOf(const Camera& camera) {
-    return {camera.position, camera.target, camera.up, camera.focus_distance};
+    return {camera.position, camera.target, camera.up, camera.focus_distance, shorterSide(camera)};
 }
 
 Camera withPose(Camera camera, const CameraPose& pose) {
@@ -28,6 +38,10 @@ Camera withPose(Camera camera, const CameraPose& pose) {
     camera.target = pose.target;
     camera.up = pose.up;
     camera.focus_distance = pose.focus_distance;
+    // Exactly 1 where the angle is the camera's own.
+    const double wider = pose.tan_half_fov / shorterSide(camera);
+    camera.tan_half_width *= wider;
+    camera.tan_half_height *= wider;
     return camera;
 }
 
@@ -59,6 +73,16 @@ void pan(CameraPose& pose, const Camera& camera, double to_right, double upwards
 
 void dolly(CameraPose& pose, double factor) {
     pose.position = pose.target + (pose.position - pose.target) * factor;
+}
+
+double fovOf_deg(const CameraPose& pose) { return std::atan(pose.tan_half_fov) * (360 / std::numbers::pi); }
+
+void setFov(CameraPose& pose, const Camera& camera, double fov_deg) {
+    setTanHalfFov(pose, camera, tanOfHalf(fov_deg));
+}
+
+void zoom(CameraPose& pose, const Camera& camera, double factor) {
+    setTanHalfFov(pose, camera, pose.tan_half_fov / factor);
 }
 
 double depthOfRay(const Camera& camera, double x, double y, double distance) {

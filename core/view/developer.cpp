@@ -73,9 +73,7 @@ void Developer::run() {
 }
 
 void Developer::develop(const Snapshot& snapshot, const Display& display) {
-    const std::uint32_t lacking =
-        aovsOfPlane(display.plane) & kAovsOfFirstHits & ~snapshot.film->shape().aovs;
-    if (lacking != 0) return;  // A film that has the plane is on its way.
+    if (aovsLacking(*snapshot.film, display.plane) != 0) return;  // A film that has the plane is on its way.
     board_.show(pictureOf(snapshot, display));
     if (std::exchange(run_, snapshot.run) != snapshot.run) {
         board_.update([](Status& status) { status.errors.clear(); });

@@ -9,16 +9,20 @@
 #include <boost/beast/core.hpp>
 #include <boost/beast/http.hpp>
 
-#include <stdexcept>
+#include <poll.h>
 #include <sys/random.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <chrono>
+#include <stdexcept>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 namespace crt {
 namespace {
@@ -28,13 +32,18 @@ namespace beast = boost::beast;
 namespace http = beast::http;
 using asio::ip::tcp;
 
-constexpr std::size_t kMostConnections = 64;
+constexpr std::size_t kMostConnections = 64, kMostSilent = 256;
 /// File descriptors of one connection: its socket and those of its I/O context.
 constexpr std::size_t kDescriptorsEach = 4;
 constexpr std::chrono::milliseconds kPause{50};
 constexpr std::uint64_t kMostBodyBytes = 65536;
 constexpr std::uint32_t kMostHeaderBytes = 16384;
 constexpr std::chrono::seconds kLongestRead{10}, kLongestWrite{30};
+
+void closeDescriptor(int& descriptor) {
+    if (descriptor >= 0) ::close(descriptor);
+    descriptor = -1;
+}
 
 /// "a%20b" → "a b".
 std::string decoded(std::string_view text) {
@@ -58,13 +67,16 @@ std::string decoded(std::string_view text) {
     return out;
 }
 
-/// Limits connections to half of the file descriptors of the process.
-std::size_t mostConnections() {
+/// `most`, or fewer where the file descriptors of the process, divided by `parts`, are not as many.
+std::size_t withinDescriptors(std::size_t most, std::size_t parts) {
     struct rlimit limit {};
-    if (::getrlimit(RLIMIT_NOFILE, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY) return kMostConnections;
-    const auto allowed = static_cast<std::size_t>(limit.rlim_cur) / 2 / kDescriptorsEach;
-    return std::clamp<std::size_t>(allowed, 2, kMostConnections);
+    if (::getrlimit(RLIMIT_NOFILE, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY) return most;
+    return std::clamp<std::size_t>(static_cast<std::size_t>(limit.rlim_cur) / parts, 2, most);
 }
+
+/// Those with threads take at most half of the descriptors, those that are silent an eighth.
+std::size_t mostConnections() { return withinDescriptors(kMostConnections, 2 * kDescriptorsEach); }
+std::size_t mostSilent() { return withinDescriptors(kMostSilent, 8); }
 
 HttpRequest requestOf(const http::request<http::string_body>& received) {
     HttpRequest request;
@@ -170,6 +182,7 @@ HttpServer::HttpServer(std::uint16_t port, std::string token,
         throw Error(ErrorKind::Usage,
                     fmt::format("port {} cannot be used: {}; without --port a free one is taken", port,
                                 error.message()));
+    acceptor.native_non_blocking(true);
     port_ = acceptor.local_endpoint().port();
     thread_ = std::thread([this, listener = currentListener()] {
         const ListenerScope scope(listener);
@@ -190,15 +203,67 @@ HttpServer::~HttpServer() {
     closed_.wait(lock, [&] { return open_.empty(); });
 }
 
+bool HttpServer::isStopping() {
+    const std::lock_guard lock(mutex_);
+    return stopping_;
+}
+
 void HttpServer::accept() {
-    while (true) {
+    while (!isStopping()) {
         try {
-            acceptOne();
+            acceptSome();
         } catch (const std::exception&) {  // Out of descriptors, threads or memory: others will end.
             std::this_thread::sleep_for(kPause);
         }
-        const std::lock_guard lock(mutex_);
-        if (stopping_) return;
+    }
+    for (Silent& each : silent_) closeDescriptor(each.descriptor);
+}
+
+/// Milliseconds until the oldest has been silent for too long; −1: there is none.
+int HttpServer::pollTime() const {
+    if (silent_.empty()) return -1;
+    const auto rest = silent_.front().until - std::chrono::steady_clock::now();
+    const auto whole = std::chrono::ceil<std::chrono::milliseconds>(rest).count();
+    return static_cast<int>(std::max<std::int64_t>(whole, 0));
+}
+
+void HttpServer::acceptSome() {
+    std::vector<pollfd> polled{{listening_->acceptor.native_handle(), POLLIN, 0}};
+    for (const Silent& each : silent_) polled.push_back({each.descriptor, POLLIN, 0});
+    if (::poll(polled.data(), polled.size(), pollTime()) < 0) return;
+    serveThoseWhoSpeak();
+    while (!silent_.empty() && silent_.front().until <= std::chrono::steady_clock::now()) {
+        closeDescriptor(silent_.front().descriptor);
+        silent_.pop_front();
+    }
+    if (polled[0].revents != 0) takeNew();
+}
+
+void HttpServer::serveThoseWhoSpeak() {
+    for (Silent& each : silent_) {
+        char first = 0;
+        const ssize_t got = ::recv(each.descriptor, &first, 1, MSG_PEEK | MSG_DONTWAIT);
+        if (got < 0 && (errno == EAGAIN || errno == EINTR)) continue;
+        if (got > 0 && !start(each)) break;  // They wait until there is room.
+        if (got <= 0) closeDescriptor(each.descriptor);
+    }
+    std::erase_if(silent_, [](const Silent& each) { return each.descriptor < 0; });
+}
+
+/// Where there are too many, the oldest make room. All of those were silent a moment ago, as no more come in
+/// at once than half of what there is room for.
+void HttpServer::takeNew() {
+    const std::size_t most = mostSilent();
+    for (std::size_t taken = 0; taken < std::max<std::size_t>(most / 2, 1); ++taken) {
+        const int descriptor =
+            ::accept4(listening_->acceptor.native_handle(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
+        if (descriptor < 0 && (errno == EAGAIN || errno == EINTR || errno == ECONNABORTED)) return;
+        if (descriptor < 0) throw std::runtime_error("no connection can be accepted");
+        if (silent_.size() >= most) {
+            closeDescriptor(silent_.front().descriptor);
+            silent_.pop_front();
+        }
+        silent_.push_back({descriptor, std::chrono::steady_clock::now() + kLongestRead});
     }
 }
 
@@ -216,21 +281,19 @@ void HttpServer::close(Connection* connection) {
     closed_.notify_all();
 }
 
-void HttpServer::acceptOne() {
+bool HttpServer::start(Silent& silent) {
     {
         std::unique_lock lock(mutex_);
         makeRoom(lock);
-        if (stopping_ || open_.size() >= mostConnections()) return;
+        if (stopping_ || open_.size() >= mostConnections()) return false;
     }
     auto connection = std::make_unique<Connection>();
-    beast::error_code error;
-    listening_->acceptor.accept(connection->socket(), error);
     const std::lock_guard lock(mutex_);
-    if (stopping_) return;
-    if (error) throw std::runtime_error(error.message());
     Connection* const raw = connection.get();
     open_.push_back(raw);
     try {
+        connection->socket().assign(tcp::v4(), silent.descriptor);
+        silent.descriptor = -1;
         std::thread([this, listener = currentListener(), own = std::move(connection)]() mutable {
             {
                 const ListenerScope scope(listener);
@@ -248,6 +311,7 @@ void HttpServer::acceptOne() {
         close(raw);
         throw;
     }
+    return true;
 }
 
 /// One request a connection: a browser that keeps one open would keep a thread.

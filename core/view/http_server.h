@@ -2,8 +2,10 @@
 /// site, is refused.
 #pragma once
 
+#include <chrono>
 #include <condition_variable>
 #include <cstdint>
+#include <deque>
 #include <functional>
 #include <list>
 #include <map>
@@ -52,10 +54,21 @@ public:
 private:
     struct Listening;
     class Connection;
+    /// A connection that has sent nothing yet: it has a descriptor, and no thread.
+    struct Silent {
+        int descriptor = -1;
+        std::chrono::steady_clock::time_point until{};
+    };
 
+    bool isStopping();
     void accept();
-    /// Waits for room, accepts one connection and serves it on a thread of its own.
-    void acceptOne();
+    /// Waits until somebody connects, speaks or has been silent for too long, and does what that takes.
+    void acceptSome();
+    int pollTime() const;
+    void serveThoseWhoSpeak();
+    void takeNew();
+    /// Serves it on a thread of its own, which takes the descriptor. False: there is no room for a thread.
+    bool start(Silent& silent);
     /// Interrupts the oldest connection that has shown no token, where there are too many, and waits a
     /// moment until one is closed.
     void makeRoom(std::unique_lock<std::mutex>& lock);
@@ -69,8 +82,9 @@ private:
     std::uint16_t port_ = 0;
     std::mutex mutex_;
     std::condition_variable closed_;
-    std::list<Connection*> open_;  ///< The oldest first.
+    std::list<Connection*> open_;  ///< Those with threads, the oldest first.
     bool stopping_ = false;
+    std::deque<Silent> silent_;  ///< Of the accepting thread; the oldest first.
     std::thread thread_;
 };
 

@@ -53,13 +53,21 @@ const std::map<std::string, Reader>& readers() {
          [](const Json& v, const std::string& k, ViewChange& to) { to.dolly = number(v, k, 0.01, 100); }},
         {"focus",
          [](const Json& v, const std::string& k, ViewChange& to) { to.focus = numberPair(v, k, 1); }},
+        {"fov_deg", [](const Json& v, const std::string& k,
+                       ViewChange& to) { to.fov_deg = number(v, k, kLeastFov_deg, kMostFov_deg); }},
+        {"zoom",
+         [](const Json& v, const std::string& k, ViewChange& to) { to.zoom = number(v, k, 0.01, 100); }},
         {"reset_camera",
          [](const Json& v, const std::string& k, ViewChange& to) { to.reset_camera = flag(v, k); }},
+        {"toggle_paused",
+         [](const Json& v, const std::string& k, ViewChange& to) { to.toggle_paused = flag(v, k); }},
         {"paused", [](const Json& v, const std::string& k, ViewChange& to) { to.paused = flag(v, k); }},
         {"samples", [](const Json& v, const std::string& k,
                        ViewChange& to) { to.samples = static_cast<std::uint64_t>(number(v, k, 1, 1e12)); }},
         {"exposure_ev", [](const Json& v, const std::string& k,
                            ViewChange& to) { to.exposure_ev = number(v, k, -100, 100); }},
+        {"exposure_step", [](const Json& v, const std::string& k,
+                             ViewChange& to) { to.exposure_step = number(v, k, -100, 100); }},
         {"white", [](const Json& v, const std::string& k, ViewChange& to) { to.white = word(v, k); }},
         {"plane", [](const Json& v, const std::string& k, ViewChange& to) { to.plane = word(v, k); }},
         {"backend", [](const Json& v, const std::string& k, ViewChange& to) { to.backend = word(v, k); }},
@@ -72,7 +80,24 @@ Json poseJson(const CameraPose& pose) {
     return {{"position", pose.position},
             {"target", pose.target},
             {"up", pose.up},
-            {"focus_distance", pose.focus_distance}};
+            {"focus_distance", pose.focus_distance},
+            {"fov_deg", fovOf_deg(pose)}};
+}
+
+Json scalesJson(const std::vector<ColourScale>& scales) {
+    Json list = Json::array();
+    for (const ColourScale& scale : scales) {
+        Json colours = Json::array();
+        for (const auto& [r, g, b] : scale.colours)
+            colours.push_back(fmt::format("#{:02x}{:02x}{:02x}", r, g, b));
+        list.push_back({{"name", scale.name},
+                        {"low", scale.low},
+                        {"high", scale.high},
+                        {"unit", scale.unit},
+                        {"logarithmic", scale.logarithmic},
+                        {"colours", std::move(colours)}});
+    }
+    return list;
 }
 
 Json errorsJson(const std::vector<ErrorPoint>& errors) {
@@ -81,11 +106,8 @@ Json errorsJson(const std::vector<ErrorPoint>& errors) {
     return list;
 }
 
-}  // namespace
-
-ViewChange readChange(const std::string& text) {
-    const Json json = Json::parse(text, nullptr, false);
-    if (!json.is_object()) throw Error(ErrorKind::Usage, "the request is no JSON object");
+ViewChange readChange(const Json& json) {
+    if (!json.is_object()) throw Error(ErrorKind::Usage, "a change is a JSON object");
     ViewChange change;
     for (const auto& [key, value] : json.items()) {
         const auto reader = readers().find(key);
@@ -101,9 +123,28 @@ ViewChange readChange(const std::string& text) {
     return change;
 }
 
+}  // namespace
+
+std::vector<RequestedChange> readChanges(const std::string& text) {
+    const Json json = Json::parse(text, nullptr, false);
+    if (!json.is_object() && !json.is_array())
+        throw Error(ErrorKind::Usage, "the request is neither a JSON object nor a list of them");
+    std::vector<RequestedChange> changes;
+    for (const Json& each : json.is_array() ? json : Json::array({json})) {
+        RequestedChange& requested = changes.emplace_back();
+        try {
+            requested.change = readChange(each);
+        } catch (const Error& error) {
+            requested.refusal = error.what();
+        }
+    }
+    return changes;
+}
+
 std::string sightJson(const Board::Sight& sight) {
     const Status& s = sight.status;
     Json json{{"version", sight.version},
+              {"program", s.program},
               {"file", s.file},
               {"title", s.title},
               {"stage", s.stage},
@@ -120,7 +161,7 @@ std::string sightJson(const Board::Sight& sight) {
               {"paths_per_second", s.paths_per_second},
               {"paused", s.paused},
               {"camera", poseJson(s.pose)},
-              {"camera_yaml", cameraYaml(s.pose, s.has_lens)},
+              {"camera_yaml", cameraYaml(s.pose, s.has_lens, s.fov_moved)},
               {"camera_moved", s.pose_moved},
               {"has_lens", s.has_lens},
               {"exposure_ev", s.exposure_ev},
@@ -133,17 +174,21 @@ std::string sightJson(const Board::Sight& sight) {
         json["picture"] = {{"number", p->number},   {"width", p->width},
                            {"height", p->height},   {"samples", p->samples},
                            {"divisor", p->divisor}, {"plane", p->plane},
-                           {"legend", p->legend},   {"of_this_camera", p->pose == s.pose}};
+                           {"run", p->run},
+                           {"legend", p->legend},   {"scales", scalesJson(p->scales)},
+                           {"of_this_camera", p->pose == s.pose}};
     // Names come from files and drivers, in whatever encoding.
     return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
-std::string cameraYaml(const CameraPose& pose, bool has_lens) {
+std::string cameraYaml(const CameraPose& pose, bool has_lens, bool has_fov) {
     const auto row = [](const char* key, const Vec3d& v) {
         return fmt::format("  {}: [{:.7g}, {:.7g}, {:.7g}]\n", key, v[0], v[1], v[2]);
     };
     std::string text =
         "camera:\n" + row("position", pose.position) + row("target", pose.target) + row("up", pose.up);
+    if (has_fov)
+        text += fmt::format("  fov: {:.7g}  # instead of focal_length and sensor\n", fovOf_deg(pose));
     if (has_lens && pose.focus_distance > 0)
         text += fmt::format("  focus_distance: {:.7g}\n", pose.focus_distance);
     return text;

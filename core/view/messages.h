@@ -7,30 +7,42 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace crt {
 
-/// What a page asks for. Lengths of gestures are parts of the image: (0, 0) is its upper left corner, (1, 1)
-/// the lower right.
+/// What a page asks for at once: all of it or, where it is refused, nothing. Lengths of gestures are parts
+/// of the image: (0, 0) is its upper left corner, (1, 1) the lower right.
 struct ViewChange {
     std::optional<std::array<double, 2>> orbit;  ///< To the right, upwards. Radians.
     std::optional<std::array<double, 2>> pan;    ///< To the right, upwards.
     std::optional<double> dolly;                 ///< Factor on the distance to the target.
     std::optional<std::array<double, 2>> focus;  ///< Where the surface is that shall be sharp.
+    std::optional<double> fov_deg;               ///< As of fovOf_deg().
+    std::optional<double> zoom;                  ///< Factor on the size of the image.
     bool reset_camera = false;                   ///< To the scene's.
+    bool toggle_paused = false;
     std::optional<bool> paused;
     std::optional<std::uint64_t> samples;
     std::optional<double> exposure_ev;
+    std::optional<double> exposure_step;  ///< Stops to add.
     std::optional<std::string> white, plane, backend, device;
 };
 
-/// Throws crt::Error(Usage) for what is no JSON, for keys that there are not, and for values out of range.
-ViewChange readChange(const std::string& text);
+/// What a request holds: changes in order. One that cannot be read leaves the others as they are.
+struct RequestedChange {
+    ViewChange change;
+    std::string refusal;  ///< Why it cannot be read; empty: it can.
+};
+
+/// An object is one change, a list several. Throws crt::Error(Usage) for text that is neither. A change is
+/// refused for unknown keys and for values out of range.
+std::vector<RequestedChange> readChanges(const std::string& text);
 
 /// All of the status, and the picture's numbers without its pixels.
 std::string sightJson(const Board::Sight& sight);
 
-/// The moved keys of a scene's camera, as the scene file has them.
-std::string cameraYaml(const CameraPose& pose, bool has_lens);
+/// The moved keys of a scene's camera, as the scene file has them; the angle only with `has_fov`.
+std::string cameraYaml(const CameraPose& pose, bool has_lens, bool has_fov);
 
 }  // namespace crt

@@ -2,9 +2,11 @@
 
 #include "base/error.h"
 #include "base/words.h"
+#include "changes.js.h"
 #include "gestures.js.h"
 #include "index.html.h"
 #include "panel.js.h"
+#include "pixel.js.h"
 #include "view.css.h"
 #include "view.js.h"
 
@@ -14,7 +16,7 @@
 #include <bit>
 #include <chrono>
 #include <cstring>
-#include <filesystem>
+#include <utility>
 
 namespace crt {
 namespace {
@@ -35,7 +37,8 @@ void putInPlace(std::string& text, const std::string& mark, const std::string& w
 HttpReply wholePage() {
     std::string html = page::kIndexHtml;
     putInPlace(html, "<!-- style -->", page::kViewCss);
-    putInPlace(html, "<!-- script -->", std::string(page::kViewJs) + page::kGesturesJs + page::kPanelJs);
+    putInPlace(html, "<!-- script -->", std::string(page::kViewJs) + page::kChangesJs +
+                                             page::kGesturesJs + page::kPanelJs + page::kPixelJs);
     const std::string nonce = randomToken();
     putInPlace(html, "<!-- nonce -->", nonce);
     return {.type = "text/html; charset=utf-8",
@@ -64,13 +67,24 @@ HttpReply sight(Viewer& viewer, const HttpRequest& request) {
     return reply;
 }
 
-HttpReply exrFile(const Viewer& viewer, const std::string& scene) {
-    std::string name = std::filesystem::path(scene).stem().string();
-    for (char& c : name)
+HttpReply download(SavedFile file, const char* type) {
+    for (char& c : file.name)
         if (c == '"' || c == '\\' || static_cast<unsigned char>(c) < 32) c = '_';
-    return {.type = "image/x-exr",
-            .body = viewer.exr(),
-            .headers = {{"Content-Disposition", fmt::format("attachment; filename=\"{}.exr\"", name)}}};
+    return {.type = type,
+            .body = std::move(file.bytes),
+            .headers = {{"Content-Disposition", fmt::format("attachment; filename=\"{}\"", file.name)}}};
+}
+
+/// Replies with the first version of the status that knows of the changes.
+HttpReply change(Viewer& viewer, const HttpRequest& request) {
+    ChangeRequest wanted{.changes = readChanges(request.body)};
+    if (const auto page = request.query.find("page"); page != request.query.end()) {
+        wanted.page = page->second;
+        wanted.first = numberIn(request, "first");
+    }
+    viewer.change(wanted);
+    return {.type = "application/json",
+            .body = fmt::format("{{\"version\": {}}}", viewer.board().now().version)};
 }
 
 }  // namespace
@@ -80,10 +94,7 @@ HttpReply answerPage(Viewer& viewer, const HttpRequest& request) {
     const std::string what = request.method + " " + request.path;
     if (what == "GET /") return wholePage();
     if (what == "GET /sight") return sight(viewer, request);
-    if (what == "POST /change") {
-        viewer.change(readChange(request.body));
-        return {.type = kJson, .body = "{}"};
-    }
+    if (what == "POST /change") return change(viewer, request);
     if (what == "GET /pixel") {
         const auto at = [&](const char* key) {
             return static_cast<std::uint32_t>(std::min<std::uint64_t>(numberIn(request, key), 0xffffffffu));
@@ -91,7 +102,8 @@ HttpReply answerPage(Viewer& viewer, const HttpRequest& request) {
         return {.type = kJson, .body = viewer.pixel(at("x"), at("y"))};
     }
     if (what == "GET /devices") return {.type = kJson, .body = viewer.devices()};
-    if (what == "GET /image.exr") return exrFile(viewer, viewer.board().now().status.file);
+    if (what == "GET /image.exr") return download(viewer.exr(), "image/x-exr");
+    if (what == "GET /image.png") return download(viewer.png(), "image/png");
     return {.status = 404, .body = "there is nothing here\n"};
 }
 

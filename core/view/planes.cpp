@@ -16,6 +16,7 @@
 #include <array>
 #include <cmath>
 #include <functional>
+#include <utility>
 
 namespace crt {
 namespace {
@@ -26,19 +27,33 @@ using Painter = std::function<Rgb(std::size_t pixel)>;
 
 constexpr std::size_t kPixelsAtOnce = 16384;
 
+std::array<std::uint8_t, 3> bytesOf(const Rgb& rgb) {
+    std::array<std::uint8_t, 3> bytes{};
+    for (std::size_t c = 0; c < 3; ++c) {
+        const double value = rgb[c] > 0 ? std::min(rgb[c], 1.0) : 0.0;  // NaN is 0.
+        bytes[c] = static_cast<std::uint8_t>(std::lround(value * 255));
+    }
+    return bytes;
+}
+
 void paint(Picture& picture, const Painter& colour) {
     const std::size_t pixels = std::size_t{picture.width} * picture.height;
     picture.rgba.resize(4 * pixels);
     parallelFor(pixels, kPixelsAtOnce, [&](std::size_t first, std::size_t end) {
         for (std::size_t p = first; p < end; ++p) {
-            const Rgb rgb = colour(p);
-            for (std::size_t c = 0; c < 3; ++c) {
-                const double value = rgb[c] > 0 ? std::min(rgb[c], 1.0) : 0.0;  // NaN is 0.
-                picture.rgba[4 * p + c] = static_cast<std::uint8_t>(std::lround(value * 255));
-            }
+            const auto bytes = bytesOf(colour(p));
+            std::copy(bytes.begin(), bytes.end(), &picture.rgba[4 * p]);
             picture.rgba[4 * p + 3] = 255;
         }
     });
+}
+
+/// Adds a bar of the colours of `colour`, which takes 0 at the low end and 1 at the high end.
+void addScale(Picture& picture, ColourScale scale, const std::function<Rgb(double part)>& colour) {
+    constexpr int kSteps = 32;
+    for (int i = 0; i <= kSteps; ++i)
+        scale.colours.push_back(bytesOf(colour(static_cast<double>(i) / kSteps)));
+    picture.scales.push_back(std::move(scale));
 }
 
 /// The bytes that a PNG of the image has.
@@ -88,6 +103,11 @@ private:
 void paintAlbedo(Picture& picture, const Image& image, const Channel& r, const Channel& g,
                  const Channel& b) {
     const std::optional<Matrix3d> to_srgb = toLinearSrgb(image);
+    picture.legend = "albedo: the share of light that the surface reflects";
+    addScale(picture, {}, [](double part) {
+        const double c = linearToSrgb(part);
+        return Rgb{c, c, c};
+    });
     paint(picture, [&](std::size_t p) {
         Rgb rgb{r[p], g[p], b[p]};
         if (to_srgb) rgb = multiply(*to_srgb, rgb);
@@ -109,12 +129,27 @@ void paintDepth(Picture& picture, const Channel& depth) {
     // A few pixels at an edge may be far off.
     const double nearest = at(0.005), farthest = at(0.995);
     const double range = std::max(farthest - nearest, 1e-9 * farthest);
-    picture.legend =
-        fmt::format("{:.4g} (light) to {:.4g} (dark) scene units along the ray", nearest, farthest);
-    paint(picture, [&](std::size_t p) {
-        if (!(depth[p] > 0)) return Rgb{};
-        const double light = 0.95 - 0.85 * std::clamp((depth[p] - nearest) / range, 0.0, 1.0);
+    const auto shade = [](double part) {
+        const double light = 0.95 - 0.85 * std::clamp(part, 0.0, 1.0);
         return Rgb{light, light, light};
+    };
+    picture.legend = "distance along the ray; black: no surface";
+    addScale(picture, {.low = nearest, .high = farthest, .unit = "scene units"}, shade);
+    paint(picture,
+          [&](std::size_t p) { return depth[p] > 0 ? shade((depth[p] - nearest) / range) : Rgb{}; });
+}
+
+void paintNormals(Picture& picture, const std::array<Channel, 3>& axes) {
+    picture.legend = "components of the normal";
+    constexpr std::array<const char*, 3> kNames{"x", "y", "z"};
+    for (std::size_t k = 0; k < 3; ++k)
+        addScale(picture, {.name = kNames[k], .low = -1, .high = 1}, [&](double part) {
+            Rgb rgb{0.5, 0.5, 0.5};
+            rgb[k] = part;
+            return rgb;
+        });
+    paint(picture, [&](std::size_t p) {
+        return Rgb{0.5 + 0.5 * axes[0][p], 0.5 + 0.5 * axes[1][p], 0.5 + 0.5 * axes[2][p]};
     });
 }
 
@@ -144,8 +179,9 @@ void paintError(Picture& picture, const Channel& error, const Channel& r, const 
     const double mean = sum / static_cast<double>(pixels);
     constexpr double kLeast = 1e-3, kDecades = 3;
     picture.legend =
-        "standard error of luminance: 0.1 % (dark) to 100 % (light) of the image's mean; grey: not known "
-        "yet";
+        "standard error of each pixel's luminance, relative to the mean of the image; grey: not yet known";
+    const double most = kLeast * std::pow(10.0, kDecades);
+    addScale(picture, {.low = 100 * kLeast, .high = 100 * most, .unit = "%", .logarithmic = true}, heat);
     paint(picture, [&](std::size_t p) {
         if (!std::isfinite(error[p]) || !(mean > 0)) return Rgb{0.3, 0.3, 0.3};  // Not known.
         if (!(error[p] > 0)) return heat(0);
@@ -161,6 +197,10 @@ const std::vector<std::string>& planeNames() {
 }
 
 std::uint32_t aovsOfPlane(const std::string& plane) { return plane == "image" ? 0 : aovNamed(plane); }
+
+std::uint32_t aovsLacking(const Film& film, const std::string& plane) {
+    return aovsOfPlane(plane) & kAovsOfFirstHits & ~film.shape().aovs;
+}
 
 std::vector<std::string> whiteNames(const Scene& scene) {
     std::vector<std::string> names{"scene", "none"};
@@ -200,6 +240,9 @@ Development developmentFor(const Display& display, const Scene& scene) {
 
 Picture pictureOf(const Snapshot& snapshot, const Display& display) {
     const Development shown = developmentFor(display, *snapshot.seen->read);
+    if (aovsLacking(*snapshot.film, display.plane) != 0)
+        throw Error(ErrorKind::Usage,
+                    fmt::format("the film does not hold '{}' yet: try again in a moment", display.plane));
     const bool colours = display.plane == "image";
     const Image image =
         resolveImage(*snapshot.film, colours ? shown : shown.forFloats(), aovsOfPlane(display.plane));
@@ -208,7 +251,8 @@ Picture pictureOf(const Snapshot& snapshot, const Display& display) {
     picture.height = image.height;
     picture.samples = snapshot.film->samples.count();
     picture.divisor = snapshot.divisor;
-    picture.pose = poseOf(snapshot.seen->camera);
+    picture.run = snapshot.run;
+    picture.pose = snapshot.seen->pose;
     picture.plane = display.plane;
     const auto channel = [&](const char* name) { return Channel(image, name); };
     if (colours) {
@@ -216,11 +260,7 @@ Picture pictureOf(const Snapshot& snapshot, const Display& display) {
     } else if (display.plane == "albedo") {
         paintAlbedo(picture, image, channel("Albedo.R"), channel("Albedo.G"), channel("Albedo.B"));
     } else if (display.plane == "normal") {
-        picture.legend = "x, y and z as red, green and blue: 0 is the middle";
-        const Channel x = channel("Ns.X"), y = channel("Ns.Y"), z = channel("Ns.Z");
-        paint(picture, [&](std::size_t p) {
-            return Rgb{0.5 + 0.5 * x[p], 0.5 + 0.5 * y[p], 0.5 + 0.5 * z[p]};
-        });
+        paintNormals(picture, {channel("Ns.X"), channel("Ns.Y"), channel("Ns.Z")});
     } else if (display.plane == "depth") {
         paintDepth(picture, channel("Z"));
     } else if (display.plane == "primitive") {

@@ -25,6 +25,9 @@ const std::vector<std::string>& planeNames();
 /// Bits of Aov that a film must hold for it.
 std::uint32_t aovsOfPlane(const std::string& plane);
 
+/// Those of them that only another film would hold.
+std::uint32_t aovsLacking(const Film& film, const std::string& plane);
+
 /// What Display::white can be beside temperatures.
 std::vector<std::string> whiteNames(const Scene& scene);
 /// The scene's development with what the display changes. Throws crt::Error(Usage) for a white that is none.

@@ -6,6 +6,7 @@
 #include "base/stage.h"
 #include "base/stopwatch.h"
 #include "compile/change_view.h"
+#include "view/silence.h"
 
 #include <algorithm>
 #include <new>
@@ -29,17 +30,6 @@ Scene viewOf(const RenderWishes& wanted, unsigned divisor) {
     }
     return view;
 }
-
-/// Nothing reaches anybody: what a scene's own camera was warned of is not said again for each step of a
-/// hand.
-class Silence {
-public:
-    Silence() : listener_([](LogLevel, std::string_view) {}, LogLevel::Off), scope_(listener_) {}
-
-private:
-    const Listener listener_;
-    const ListenerScope scope_;
-};
 
 }  // namespace
 
@@ -171,6 +161,7 @@ void Renderer::seeScene(const RenderWishes& wanted) {
     shown_ = false;
     seconds_ = 0;
     SeenScene seen{.read = wanted.scene,
+                   .pose = wanted.pose,
                    .camera = withPose(wanted.scene->camera, wanted.pose),
                    .names = names_,
                    .width = static_cast<std::uint32_t>(wanted.scene->film.width),
@@ -188,6 +179,7 @@ void Renderer::setView(const RenderWishes& wanted, unsigned divisor) {
     const Scene view = viewOf(wanted, divisor);
     const CompileOptions options = compileOptionsFor(session_->backend());
     const auto change = [&] {
+        // The scene's own camera was warned of already.
         const Silence silence;
         return changeView(*compiled_, view, options);
     };

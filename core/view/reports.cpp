@@ -8,7 +8,9 @@
 #include "image/image_io.h"
 #include "render/outputs.h"
 #include "scene/aov.h"
+#include "scene/light_units.h"
 #include "spectra/spectra.h"
+#include "view/silence.h"
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -16,6 +18,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <functional>
 #include <iterator>
 #include <limits>
 
@@ -53,12 +56,16 @@ std::string pixelJson(const Snapshot& snapshot, std::uint32_t x, std::uint32_t y
     const Vec3d xyz{film.mean(i, j, 0), film.mean(i, j, 1), film.mean(i, j, 2)};
     Json json{{"x", x},
               {"y", y},
+              {"run", snapshot.run},
               {"preview", snapshot.divisor > 1},
               {"samples", film.counts[pixel]},
               {"rgb", multiply(xyzToRgb(ColorSpace::LinearSrgb), xyz)},
-              {"xyz", xyz}};
+              {"xyz", xyz},
+              {"unit", "W·m⁻²·sr⁻¹·nm⁻¹"},
+              {"luminance_cd_m2", luminanceOfUnitY_cd_m2() * xyz[1]}};
     const double variance = LuminanceVariance(film)(i, j);
-    if (std::isfinite(variance)) json["luminance_error"] = std::sqrt(variance);
+    if (std::isfinite(variance))
+        json["luminance_error_cd_m2"] = luminanceOfUnitY_cd_m2() * std::sqrt(variance);
     if (!film.primitives.empty() && film.primitives[pixel] != CRT_NONE) {
         const PrimitiveName name = seen.names->of(film.primitives[pixel]);
         json["primitive"] = film.primitives[pixel];
@@ -83,26 +90,86 @@ std::optional<double> depthAt(const Snapshot& snapshot, double x, double y) {
     return depth > 0 && std::isfinite(depth) ? std::optional(depth) : std::nullopt;
 }
 
-std::string exrOf(const Snapshot& snapshot) {
-    if (snapshot.divisor > 1)
-        throw Error(ErrorKind::Usage, "the picture is still a small one: in a moment it is whole");
+namespace {
+
+std::uint32_t savedAovs(const Film& film) { return film.shape().aovs & kAovsOfFirstHits; }
+
+FilmIdentity identityOf(const Snapshot& snapshot) {
     Scene scene = *snapshot.seen->read;
     scene.camera = snapshot.seen->camera;
-    const Film& film = *snapshot.film;
     constexpr double kNobodyTraces = std::numeric_limits<double>::infinity();
-    const std::uint32_t aovs = film.shape().aovs & kAovsOfFirstHits;
+    const std::uint32_t aovs = savedAovs(*snapshot.film);
     FilmIdentity identity{.scene_hash = compileScene(scene, aovs, {.accelerator_reach = kNobodyTraces}).hash,
                           .version = CRT_VERSION,
                           .record = recordOf(scene)};
     identity.record->paths = snapshot.seen->paths;
     identity.record->complete = snapshot.complete;
     identity.record->date_utc = dateUtc();
+    return identity;
+}
+
+/// The bytes of a file that `write` writes.
+std::string bytesFrom(const std::string& name, const std::function<void(const std::string& path)>& write) {
     const TemporaryFolder folder;
-    const std::string path = folder / "image.exr";
-    writeOutput({.file = path, .format = OutputFormat::Exr, .aovs = aovs | kAovError, .place = {}}, film,
-                identity);
+    const std::string path = folder / name;
+    write(path);
     std::ifstream file(path, std::ios::binary);
     return {std::istreambuf_iterator<char>(file), {}};
+}
+
+void requireWhole(const Snapshot& snapshot) {
+    if (snapshot.divisor > 1)
+        throw Error(ErrorKind::Usage, "the picture is still a small preview: try again in a moment");
+}
+
+/// "room_64spp.png"
+std::string fileName(const Snapshot& snapshot, const std::string& stem, const std::string& ending) {
+    return fmt::format("{}_{}spp{}", stem, snapshot.film->samples.count(), ending);
+}
+
+/// A picture of planes as a file has it: with what its colours stand for, as the bar is not in it.
+Image imageOf(const Picture& picture) {
+    Image image;
+    image.width = picture.width;
+    image.height = picture.height;
+    image.channels = {"R", "G", "B"};
+    for (std::size_t i = 0; i < picture.rgba.size(); ++i)
+        if (i % 4 != 3) image.pixels.push_back(static_cast<float>(srgbToLinear(picture.rgba[i] / 255.0)));
+    image.metadata.emplace_back("crt/shown", picture.plane);
+    image.metadata.emplace_back("crt/legend", picture.legend);
+    for (const ColourScale& scale : picture.scales)
+        image.metadata.emplace_back("crt/scale" + (scale.name.empty() ? "" : "/" + scale.name),
+                                    fmt::format("{:.6g} to {:.6g}{}{}", scale.low, scale.high,
+                                                scale.unit.empty() ? "" : " " + scale.unit,
+                                                scale.logarithmic ? ", logarithmic" : ""));
+    return image;
+}
+
+}  // namespace
+
+SavedFile exrOf(const Snapshot& snapshot, const std::string& stem) {
+    requireWhole(snapshot);
+    const std::uint32_t aovs = savedAovs(*snapshot.film) | kAovError;
+    const auto write = [&](const std::string& path) {
+        writeOutput({.file = path, .format = OutputFormat::Exr, .aovs = aovs, .place = {}}, *snapshot.film,
+                    identityOf(snapshot));
+    };
+    return {fileName(snapshot, stem, ".exr"), bytesFrom("image.exr", write)};
+}
+
+SavedFile pngOf(const Snapshot& snapshot, const Display& display, const std::string& stem) {
+    requireWhole(snapshot);
+    const bool colours = display.plane == "image";
+    const auto write = [&](const std::string& path) {
+        const Silence silence;  // About a temporary file.
+        if (!colours) return writeImage(path, OutputFormat::Png, imageOf(pictureOf(snapshot, display)));
+        FilmIdentity identity = identityOf(snapshot);
+        identity.record->development = developmentFor(display, *snapshot.seen->read);
+        writeOutput({.file = path, .format = OutputFormat::Png, .aovs = 0, .place = {}}, *snapshot.film,
+                    identity);
+    };
+    return {fileName(snapshot, stem, (colours ? "" : "_" + display.plane) + ".png"),
+            bytesFrom("image.png", write)};
 }
 
 std::string devicesJson() {

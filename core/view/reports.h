@@ -1,6 +1,7 @@
-/// What a page asks for once: a pixel, the image as a file, the devices.
+/// What a page asks for once: a pixel, the image as files, the devices.
 #pragma once
 
+#include "view/planes.h"
 #include "view/snapshot.h"
 
 #include <cstdint>
@@ -17,9 +18,17 @@ std::string pixelJson(const Snapshot& snapshot, std::uint32_t x, std::uint32_t y
 /// there is none, or the film does not know.
 std::optional<double> depthAt(const Snapshot& snapshot, double x, double y);
 
-/// The bytes of an EXR file with the image and all that the film holds. Throws crt::Error(Usage) for a
-/// preview, and crt::Error(Output).
-std::string exrOf(const Snapshot& snapshot);
+/// A file that a browser saves.
+struct SavedFile {
+    std::string name, bytes;
+};
+
+/// An EXR file with the image and all that the film holds. Its name begins with `stem`. Throws
+/// crt::Error(Usage) for a preview, and crt::Error(Output).
+SavedFile exrOf(const Snapshot& snapshot, const std::string& stem);
+/// A PNG file of what pages show: for the image what `crt render` writes with that exposure and white.
+/// Throws as exrOf(), and for a plane that the film does not hold yet.
+SavedFile pngOf(const Snapshot& snapshot, const Display& display, const std::string& stem);
 
 /// What `crt plugins` lists, as JSON.
 std::string devicesJson();

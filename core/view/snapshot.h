@@ -4,6 +4,7 @@
 #include "film/error_estimate.h"
 #include "film/film.h"
 #include "scene/scene.h"
+#include "view/camera_moves.h"
 #include "view/primitive_names.h"
 
 #include <cstdint>
@@ -14,7 +15,8 @@ namespace crt {
 /// A scene as it is seen: its camera is where hands have moved it.
 struct SeenScene {
     std::shared_ptr<const Scene> read;  ///< As the file says.
-    Camera camera;                      ///< Instead of the file's.
+    CameraPose pose;                    ///< Where hands have moved the camera.
+    Camera camera;                      ///< The file's with that pose.
     std::shared_ptr<const PrimitiveNames> names;
     std::uint32_t width = 0, height = 0;  ///< Of the whole film's crop window.
     PathFacts paths;

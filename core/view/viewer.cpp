@@ -3,8 +3,8 @@
 #include "base/error.h"
 #include "base/log.h"
 #include "scene/aov.h"
+#include "view/http_server.h"
 #include "view/planes.h"
-#include "view/reports.h"
 
 #include <fmt/format.h>
 
@@ -38,6 +38,7 @@ std::uint32_t basicAovs(const Scene& scene) {
 
 Viewer::Viewer(const ViewOptions& options)
     : outer_(currentListener()),
+      file_stem_(std::filesystem::path(options.scene.file).stem().string()),
       listener_(
           [this](LogLevel level, std::string_view message) { hear(level, message); }, LogLevel::Debug,
           [this](const std::string& what) { board_.update([&](Status& status) { status.stage = what; }); }),
@@ -50,7 +51,10 @@ Viewer::Viewer(const ViewOptions& options)
                     developer_.take(std::move(snapshot));
                 }),
       source_(options.scene, board_, [this](auto scene) { takeScene(std::move(scene)); }) {
-    board_.update([&](Status& status) { status.file = options.scene.file; });
+    board_.update([&, program = randomToken()](Status& status) {
+        status.file = options.scene.file;
+        status.program = program;
+    });
 }
 
 Viewer::~Viewer() { stop(); }
@@ -95,10 +99,29 @@ void Viewer::takeScene(std::shared_ptr<const Scene> scene) {
     });
 }
 
-void Viewer::change(const ViewChange& change) {
+void Viewer::change(const ChangeRequest& request) {
+    const std::lock_guard ordered(order_mutex_);
+    std::string refusals;
+    for (std::size_t i = 0; i < request.changes.size(); ++i) {
+        if (!request.page.empty() && !taken_.take(request.page, request.first + i)) continue;
+        const RequestedChange& one = request.changes[i];
+        std::string refusal = one.refusal;
+        try {
+            if (refusal.empty()) changeOnce(one.change);
+        } catch (const Error& error) {
+            refusal = error.what();
+        }
+        if (!refusal.empty()) refusals += (refusals.empty() ? "" : "\n") + refusal;
+    }
+    if (!refusals.empty()) throw Error(ErrorKind::Usage, refusals);
+}
+
+void Viewer::changeOnce(const ViewChange& change) {
     const std::lock_guard lock(mutex_);
-    if (!scene_ && (change.orbit || change.pan || change.dolly || change.focus || change.exposure_ev ||
-                    change.white || change.plane))
+    const bool of_camera = change.orbit || change.pan || change.dolly || change.focus || change.fov_deg ||
+                           change.zoom;
+    const bool of_display = change.exposure_ev || change.exposure_step || change.white || change.plane;
+    if (!scene_ && (of_camera || of_display))
         throw Error(ErrorKind::Usage, "there is no scene yet");
     // Both may refuse.
     const CameraPose pose = poseAfter(change);
@@ -109,6 +132,7 @@ void Viewer::change(const ViewChange& change) {
     if (!(display == developer_.display())) developer_.setDisplay(display);
     renderer_.wish([&](RenderWishes& wishes) {
         if (change.paused) wishes.paused = *change.paused;
+        if (change.toggle_paused) wishes.paused = !wishes.paused;
         if (change.samples) wishes.samples = *change.samples;
         if (change.backend) wishes.backend = *change.backend;
         if (change.backend || change.device) wishes.integrator.device = change.device.value_or("");
@@ -136,8 +160,10 @@ CameraPose Viewer::poseAfter(const ViewChange& change) const {
     CameraPose pose = change.reset_camera && scene_ ? poseOf(scene_->camera) : pose_;
     if (change.focus) pose.focus_distance = focusAt(*change.focus);
     if (change.orbit) orbit(pose, (*change.orbit)[0], (*change.orbit)[1]);
-    if (change.pan) pan(pose, scene_->camera, (*change.pan)[0], (*change.pan)[1]);
+    if (change.pan) pan(pose, withPose(scene_->camera, pose), (*change.pan)[0], (*change.pan)[1]);
     if (change.dolly) dolly(pose, *change.dolly);
+    if (change.fov_deg) setFov(pose, scene_->camera, *change.fov_deg);
+    if (change.zoom) zoom(pose, scene_->camera, *change.zoom);
     if (scene_) requireReach(pose, scene_->camera);
     return pose;
 }
@@ -154,12 +180,16 @@ double Viewer::focusAt(const std::array<double, 2>& place) const {
     const double top = y1 > y0 ? y0 : 0, bottom = y1 > y0 ? y1 : scene_->film.height;
     const double x = (left + place[0] * (right - left)) / scene_->film.width;
     const double y = (top + place[1] * (bottom - top)) / scene_->film.height;
-    return depthOfRay(scene_->camera, x, y, *distance);
+    return depthOfRay(now->seen->camera, x, y, *distance);
 }
 
 Display Viewer::displayAfter(const ViewChange& change) const {
     Display display = developer_.display();
     if (change.exposure_ev) display.exposure_ev = change.exposure_ev;
+    if (change.exposure_step) {
+        const double now = display.exposure_ev.value_or(scene_->film.exposure_ev);
+        display.exposure_ev = std::clamp(now + *change.exposure_step, -100.0, 100.0);
+    }
     if (change.white) {
         display.white = *change.white;
         developmentFor(display, *scene_);  // Refuses a white that is none.
@@ -186,6 +216,7 @@ void Viewer::tellSettings(const RenderWishes& wishes) {
         status.has_lens = scene_->camera.aperture_radius > 0;
         status.pose = pose_;
         status.pose_moved = !(pose_ == poseOf(scene_->camera));
+        status.fov_moved = pose_.tan_half_fov != poseOf(scene_->camera).tan_half_fov;
         status.exposure_ev = display.exposure_ev.value_or(scene_->film.exposure_ev);
         status.whites = whiteNames(*scene_);
         status.samples_wanted = wishes.samplesWanted();
@@ -198,11 +229,18 @@ std::string Viewer::pixel(std::uint32_t x, std::uint32_t y) const {
     return pixelJson(*now, x, y);
 }
 
-std::string Viewer::exr() const {
+Snapshot Viewer::filmOfView() const {
     const std::optional<Snapshot> now = developer_.newest();
     if (!now) throw Error(ErrorKind::Usage, "there is no picture yet");
-    return exrOf(*now);
+    const std::lock_guard lock(mutex_);
+    if (now->seen->read != scene_ || !(now->seen->pose == pose_))
+        throw Error(ErrorKind::Usage, "the picture is still that of the view before: try again in a moment");
+    return *now;
 }
+
+SavedFile Viewer::exr() const { return exrOf(filmOfView(), file_stem_); }
+
+SavedFile Viewer::png() const { return pngOf(filmOfView(), developer_.display(), file_stem_); }
 
 std::string Viewer::devices() {
     const std::lock_guard lock(devices_mutex_);

@@ -6,7 +6,9 @@
 #include "view/board.h"
 #include "view/developer.h"
 #include "view/messages.h"
+#include "view/page_changes.h"
 #include "view/renderer.h"
+#include "view/reports.h"
 #include "view/scene_source.h"
 #include "view/tev_sender.h"
 
@@ -16,6 +18,7 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace crt {
 
@@ -25,6 +28,12 @@ struct ViewOptions {
     IntegratorOptions integrator;
     std::uint64_t samples = 0;  ///< Per pixel; 0: the scene's.
     std::optional<TevAddress> tev;
+};
+
+struct ChangeRequest {
+    std::vector<RequestedChange> changes;
+    std::string page{};       ///< Empty: its changes have no numbers.
+    std::uint64_t first = 0;  ///< Number of the first of the changes.
 };
 
 class Viewer {
@@ -39,12 +48,15 @@ public:
     Board& board() { return board_; }
     const ListenerRef& listener() const { return listener_.ref(); }
 
-    /// Throws crt::Error(Usage) for what this scene or film cannot do; then nothing is changed.
-    void change(const ViewChange& change);
+    /// Makes the changes in order, and those of a page that numbers them once, however often it sends them.
+    /// Then throws crt::Error(Usage) if this scene or film cannot do some of them, which change nothing.
+    void change(const ChangeRequest& request);
     /// What the film knows of a pixel of the crop window, as JSON. Throws crt::Error(Usage).
     std::string pixel(std::uint32_t x, std::uint32_t y) const;
-    /// The image as an EXR file. Throws crt::Error.
-    std::string exr() const;
+    /// The image, and the picture as it is shown, as files. Throws crt::Error, with Usage while the newest
+    /// film is not one of the present view.
+    SavedFile exr() const;
+    SavedFile png() const;
     /// Backends and devices, as JSON. Opens all of them the first time.
     std::string devices();
 
@@ -54,12 +66,15 @@ public:
 private:
     void hear(LogLevel level, std::string_view message);
     void takeScene(std::shared_ptr<const Scene> scene);
+    void changeOnce(const ViewChange& change);
+    Snapshot filmOfView() const;
     CameraPose poseAfter(const ViewChange& change) const;
     double focusAt(const std::array<double, 2>& place) const;
     Display displayAfter(const ViewChange& change) const;
     void tellSettings(const RenderWishes& wishes);
 
     const ListenerRef outer_;
+    const std::string file_stem_;
     Board board_;
     Listener listener_;
     const ListenerScope scope_;
@@ -68,6 +83,9 @@ private:
     std::shared_ptr<const Scene> scene_;
     CameraPose pose_;
     std::uint32_t aovs_ = 0;  ///< That were looked at.
+
+    std::mutex order_mutex_;  ///< Of changes.
+    PageChanges taken_;
 
     std::mutex devices_mutex_;
     std::string devices_;

@@ -68,6 +68,13 @@ def default_signals(*more):
         signal.signal(number, signal.SIG_DFL)
 
 
+def processor_seconds(process):
+    """Time that a child has spent on processors."""
+    with open(f"/proc/{process.pid}/stat", encoding="ascii", errors="replace") as file:
+        fields = file.read().rsplit(")", 1)[1].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
 def read_pfm(path):
     with open(path, "rb") as file:
         kind, size, scale = file.readline().split(), file.readline().split(), float(file.readline())

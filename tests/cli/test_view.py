@@ -275,19 +275,29 @@ class Access(CliTest):
             connection.close()
 
     def test_silent_connections_lock_nobody_out(self):
-        for limit in (None, 64):
+        """Whoever has the token is answered while they are there, and not once they have ended."""
+        for limit, most in ((None, 256), (64, 8)):
             view = View(self, "-b", "fake", most_descriptors=limit)
             view.wait_until_done()
-            silent = []
-            for _ in range(300):
-                silent.append(socket.create_connection(("127.0.0.1", view.port), 30))
+            before, threads = harness.processor_seconds(view.process), self.threads_of(view)
+            silent = [socket.create_connection(("127.0.0.1", view.port), 30) for _ in range(500)]
             for _ in range(5):
                 view.sight()
+            # The server has room for so many: the oldest gave way to those that came later.
+            self.assertIn(sum(is_open(connection) for connection in silent), range(most // 2, most + 1))
+            self.assertTrue(is_open(silent[-1]))
+            # Those that only connect cost no threads, and nothing while they are silent.
+            self.assertLess(self.threads_of(view), threads + 4)
+            self.assertLess(harness.processor_seconds(view.process) - before, 3)
             for connection in silent:
                 connection.close()
             view.sight()
             self.assertIsNone(view.process.poll())
             view.process.kill()
+
+    def threads_of(self, view):
+        with open(f"/proc/{view.process.pid}/status", encoding="ascii", errors="replace") as file:
+            return int(next(line for line in file if line.startswith("Threads:")).split()[1])
 
     def test_a_camera_goes_no_farther_than_directions_are_exact(self):
         view = View(self, "-b", "fake")
@@ -384,6 +394,18 @@ class Tev(CliTest):
             view = View(self, "-b", "fake", "--tev", f"127.0.0.1:{nobody.getsockname()[1]}")
             status, _ = view.wait(lambda s: s["tev"])
         self.assertIn("is not reached", status["tev"])
+
+
+def is_open(connection):
+    """Whether the other end has neither closed it nor sent anything."""
+    connection.setblocking(False)
+    try:
+        connection.recv(1)
+        return False
+    except BlockingIOError:
+        return True
+    except ConnectionError:
+        return False
 
 
 def is_newer(status, than):

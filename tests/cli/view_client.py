@@ -42,9 +42,20 @@ class View:
         return json.loads(reply[4:4 + length]), reply[4 + length:]
 
     def change(self, **wish):
-        request = urllib.request.Request(self.url("/change"), json.dumps(wish).encode(), method="POST")
+        return self.changes(wish)
+
+    def changes(self, wishes, **query):
+        """One change or a list of them; with page= and first=, as a page numbers them."""
+        request = urllib.request.Request(self.url("/change", **query), json.dumps(wishes).encode(),
+                                         method="POST")
         with urllib.request.urlopen(request, timeout=PATIENCE_SECONDS) as reply:
-            return reply.read()
+            return json.loads(reply.read())
+
+    def download(self, path):
+        """The name that a browser gives the file, and its bytes."""
+        with urllib.request.urlopen(self.url(path), timeout=PATIENCE_SECONDS) as reply:
+            name = reply.headers["Content-Disposition"].split('filename="')[1].rstrip('"')
+            return name, reply.read()
 
     def wait(self, condition, what="what was waited for"):
         """The first sight whose status is as wanted, and its picture."""

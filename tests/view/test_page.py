@@ -1,90 +1,20 @@
 #!/usr/bin/env python3
 """The page of `crt view` in a browser: what hands do to it, what it shows, and what it says when something
-is wrong. Needs Playwright and Chromium; without them exit code 77 says that it was skipped.
+is wrong.
 
     test_page.py CRT CONFIG_DIR FAKE_PLUGIN_DIR [unittest arguments]
 """
 
-import pathlib
 import re
-import shutil
-import sys
-import time
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "cli"))
+from page_test import DONE, PageTest  # The first: it knows where the others are.
 
-import harness  # noqa: E402
-from harness import LightTest, LIT  # noqa: E402
-from view_client import View, ppm_pixels, without_alpha  # noqa: E402
+import harness
+from harness import LIT
+from image_headers import png_pixels
+from view_client import View, ppm_pixels
 
-try:
-    from playwright.sync_api import sync_playwright
-except ImportError:
-    print("skipped: the Python package playwright is not installed")
-    sys.exit(77)
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-if CHROMIUM is None:
-    print("skipped: there is no Chromium (Debian: chromium)")
-    sys.exit(77)
-
-PATIENCE_SECONDS = 900  # Only ends hangs: the machine may have much else to do.
-DONE = "view.picture && view.picture.divisor === 1 && view.status.samples === view.status.samples_wanted" \
-    " && view.picture.samples === view.status.samples && view.picture.of_this_camera && !sending"
 LENS = LIT.replace("fov: 40", "fov: 40, aperture_radius: 0.05")
-
-
-class PageTest(LightTest):
-    @classmethod
-    def setUpClass(cls):
-        cls.playwright = sync_playwright().start()
-        cls.addClassCleanup(cls.playwright.stop)
-        # In a container root has no other way.
-        cls.browser = cls.playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        cls.addClassCleanup(cls.browser.close)
-
-    def setUp(self):
-        super().setUp()
-        self.write("scene.yaml", LIT)
-
-    def open(self, *arguments, width=1280, height=800, **context):
-        self.view = View(self, "-b", self.backend, *arguments)
-        return self.page_of(self.view, width, height, **context)
-
-    def page_of(self, view, width=1280, height=800, **context):
-        context = self.browser.new_context(viewport={"width": width, "height": height}, **context)
-        self.addCleanup(context.close)
-        page = context.new_page()
-        page.set_default_timeout(1000 * PATIENCE_SECONDS)
-        self.errors = []
-        page.on("pageerror", lambda error: self.errors.append(str(error)))
-        page.goto(view.address)
-        return page
-
-    def tearDown(self):
-        self.assertEqual(getattr(self, "errors", []), [])
-
-    def wait(self, page, condition):
-        """Asked from here: the page's own rules let nobody evaluate text in it."""
-        end = time.monotonic() + PATIENCE_SECONDS
-        while not page.evaluate(f"Boolean({condition})"):
-            self.assertLess(time.monotonic(), end, condition)
-            page.wait_for_timeout(30)
-
-    def done_beyond(self, page, number):
-        """Waits for a whole picture that was made after that one."""
-        self.wait(page, f"{DONE} && view.picture.number > {number}")
-
-    def number(self, page):
-        return page.evaluate("view.picture.number")
-
-    def pixels(self, page):
-        """What the canvas holds, [height][width][3]."""
-        return without_alpha(bytes(page.evaluate(
-            "Array.from(paper.getImageData(0, 0, canvas.width, canvas.height).data)")))
-
-    def middle(self, page):
-        box = page.locator("#canvas").bounding_box()
-        return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2, box
 
 
 class Picture(PageTest):
@@ -112,8 +42,46 @@ class Picture(PageTest):
         page.get_by_role("button", name="depth").click()
         self.done_beyond(page, number)
         self.assertEqual(page.locator("[aria-pressed=true]").text_content(), "depth")
-        self.assertIn("scene units", page.locator("#legend").text_content())
+        self.assertIn("distance", page.locator("#legend").text_content())
         self.assertRegex(page.locator("#error").text_content(), r"^[0-9.]+ %$")
+
+    def test_colour_bars_have_numbers_and_units(self):
+        page = self.open("--spp", "32")
+        self.wait(page, DONE)
+        self.assertEqual(page.locator(".scale").count(), 0)
+        expected = {"error": ["0.1 %", "1", "10", "100 %"], "albedo": ["0", "0.5", "1"],
+                    "normal": ["-1", "0", "1"] * 3, "primitive": []}
+        for plane, numbers in expected.items():
+            page.get_by_role("button", name=plane).click()
+            self.wait(page, f"view.picture.plane === '{plane}' && {DONE}")
+            self.assertEqual(page.locator(".ticks span").all_text_contents(), numbers)
+        page.get_by_role("button", name="depth").click()
+        self.wait(page, f"view.picture.plane === 'depth' && {DONE}")
+        scale = page.evaluate("view.picture.scales[0]")
+        near, middle, far = page.locator(".ticks span").all_text_contents()
+        self.assertEqual((near, far), tuple(f"{scale[end]:.4g} scene units" for end in ("low", "high")))
+        self.assertTrue(scale["low"] < float(middle) < scale["high"])
+        self.assertIn("linear-gradient", page.locator(".scale i").evaluate("e => e.style.background"))
+
+    def test_the_picture_is_saved_as_it_is_shown(self):
+        page = self.open()
+        self.wait(page, DONE)
+        page.locator("#canvas").focus()
+        release = self.hold(page, "**/change?*")
+        with page.expect_download() as download:
+            page.keyboard.press("]")
+            page.keyboard.press("p")
+            page.wait_for_timeout(300)
+            release()
+        self.assertEqual(download.value.suggested_filename, "scene_16spp.png")
+        self.wait(page, f"view.status.exposure_ev > 0 && {DONE}")
+        self.assertEqual(b"".join(png_pixels(download.value.path())), self.pixels(page))
+        page.get_by_role("button", name="depth").click()
+        self.wait(page, f"view.picture.plane === 'depth' && {DONE}")
+        with page.expect_download() as download:
+            page.get_by_role("button", name="Save .png").click()
+        self.assertEqual(download.value.suggested_filename, "scene_16spp_depth.png")
+        self.assertEqual(b"".join(png_pixels(download.value.path())), self.pixels(page))
 
     def test_two_tabs_see_one_render(self):
         page = self.open()
@@ -206,10 +174,27 @@ class Hands(PageTest):
         self.assertFalse(page.locator("#help").is_visible())
         with page.expect_download() as download:
             page.keyboard.press("s")
-        self.assertEqual(download.value.suggested_filename, "scene.exr")
+        self.assertEqual(download.value.suggested_filename, "scene_16spp.exr")
         self.assertEqual(harness.read_bytes(download.value.path())[:4], b"\x76\x2f\x31\x01")
         page.keyboard.press("ArrowLeft")
         self.wait(page, "view.status.camera_moved")
+
+
+    def test_the_field_of_view_is_shown_in_degrees_and_changed(self):
+        page = self.open()
+        self.wait(page, DONE)
+        self.assertEqual(page.locator("#fov-number").input_value(), "40")
+        page.locator("#canvas").focus()
+        page.keyboard.press(",")
+        self.wait(page, f"view.status.camera.fov_deg < 39 && {DONE}")
+        self.assertEqual(page.locator("#fov-number").input_value(),
+                         f"{page.evaluate('view.status.camera.fov_deg'):.4g}")
+        page.locator("#fov-number").fill("25")
+        page.keyboard.press("Enter")
+        self.wait(page, f"view.status.camera.fov_deg === 25 && {DONE}")
+        self.assertIn("fov: 25", page.locator("#yaml").text_content())
+        page.locator("#fov").fill("60")
+        self.wait(page, "Math.abs(view.status.camera.fov_deg - 60) < 1e-9")
 
 
 class Trouble(PageTest):
@@ -270,6 +255,12 @@ class Width(PageTest):
             self.assertLessEqual(page.evaluate("document.documentElement.scrollWidth"), width)
             self.assertLessEqual(box["x"] + box["width"], width)
             self.assertLess(abs(box["width"] / box["height"] - 24 / 16), 0.02)
+            for plane in ("error", "normal", "depth"):
+                page.evaluate(f"change({{ plane: '{plane}' }})")
+                self.wait(page, f"view.picture.plane === '{plane}' && {DONE}")
+                self.assertLessEqual(page.evaluate("document.documentElement.scrollWidth"), width)
+                for bar in page.locator(".scale").all():
+                    self.assertLessEqual(bar.bounding_box()["x"] + bar.bounding_box()["width"], width)
 
     def test_a_long_path_in_a_note_keeps_off_its_button(self):
         page = self.open(width=320, height=640)

@@ -40,7 +40,8 @@ canvas.addEventListener("pointermove", (event) => {
   if (pinch && fingers.size === 2) {
     const next = twoFingers();
     const moved = [next.middle[0] - pinch.middle[0], pinch.middle[1] - next.middle[1]];
-    change({ pan: moved, dolly: Math.min(10, Math.max(0.1, pinch.distance / Math.max(next.distance, 1))) });
+    change({ pan: moved });
+    change({ dolly: Math.min(10, Math.max(0.1, pinch.distance / Math.max(next.distance, 1))) });
     pinch = next;
     return;
   }
@@ -76,19 +77,23 @@ const keys = {
   r: () => change({ reset_camera: true }),
   c: () => by("copy").click(),
   s: () => by("save").click(),
+  p: () => by("save-png").click(),
   "?": () => by("help").showModal(),
   "+": () => change({ dolly: 0.9 }),
   "=": () => change({ dolly: 0.9 }),
   "-": () => change({ dolly: 1 / 0.9 }),
-  "[": () => stepExposure(-1 / 3),
-  "]": () => stepExposure(1 / 3),
+  "[": () => change({ exposure_step: -1 / 3 }),
+  "]": () => change({ exposure_step: 1 / 3 }),
+  ",": () => change({ zoom: 1.1 }),
+  ".": () => change({ zoom: 1 / 1.1 }),
+  Escape: () => clearPixel(),
 };
 planeKeys.forEach((plane, i) => { keys[i + 1] = () => change({ plane }); });
 const arrows = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 
 addEventListener("keydown", (event) => {
   const on = event.target;
-  const typing = on.matches("input, select, textarea") || by("help").open;
+  const typing = on.matches("input:not([type=range]), select") || by("help").open;
   if (typing || event.ctrlKey || event.metaKey || event.altKey) return;
   if (event.key === " " && on.matches("button, a")) return;
   const arrow = arrows[event.key];

@@ -29,6 +29,42 @@ function setText(id, text) {
   if (there.textContent !== text) there.textContent = text;
 }
 
+/// Numbers that stand at equal distances along a bar.
+function ticks({ low, high, logarithmic }) {
+  const parts = logarithmic ? Math.round(Math.log10(high / low)) : 2;
+  return Array.from({ length: parts + 1 }, (_, i) =>
+    logarithmic ? low * 10 ** i : low + i / parts * (high - low));
+}
+
+function scaleBar(scale) {
+  const unit = scale.unit ? " " + scale.unit : "";
+  const numbers = ticks(scale).map((value) => figure(value, 4));
+  numbers[0] += unit;
+  numbers[numbers.length - 1] += unit;
+  const box = element("div", "", { class: "scale", role: "img",
+    "aria-label": (scale.name ? scale.name + ": " : "") + numbers[0] + " to " + numbers[numbers.length - 1] });
+  const bar = element("i");
+  bar.style.background = "linear-gradient(to right, " + scale.colours.join(", ") + ")";
+  const line = element("div", "", { class: "ticks" });
+  line.append(...numbers.map((text) => element("span", text)));
+  if (scale.name) box.append(element("b", scale.name));
+  box.append(bar, line);
+  return box;
+}
+
+let scalesDrawn = "";
+
+/// What the colours of the picture stand for.
+function drawScales({ legend, scales }) {
+  const now = JSON.stringify([legend, scales]);
+  if (now === scalesDrawn) return;
+  scalesDrawn = now;
+  const parts = scales.map(scaleBar);
+  if (legend) parts.unshift(element("p", legend));
+  by("legend").replaceChildren(...parts);
+  layOut();
+}
+
 function isUsed(control) {
   return document.activeElement === control;
 }
@@ -51,8 +87,8 @@ function showStatus(status) {
   if (!isUsed(by("count"))) by("count").value = status.samples_wanted;
   for (const button of by("planes").children)
     button.setAttribute("aria-pressed", String(button.textContent === status.plane));
-  setText("legend", status.picture ? status.picture.legend : "");
   showDevelopment(status);
+  showFov(status);
   setText("yaml", status.camera_yaml.trimEnd());
   setText("lens", status.has_lens ? "Ctrl and a click focus the lens." : "");
   by("reset").disabled = !status.camera_moved;
@@ -62,8 +98,7 @@ function showStatus(status) {
 }
 
 function showDevelopment(status) {
-  const exposure = by("exposure");
-  if (!isUsed(exposure)) exposure.value = status.exposure_ev;
+  if (knowsAllChanges(status)) by("exposure").value = status.exposure_ev;
   setText("stops", (status.exposure_ev >= 0 ? "+" : "") + figure(status.exposure_ev) + " stops");
   const white = by("white");
   const names = [...status.whites, "temperature"];
@@ -78,10 +113,19 @@ function showDevelopment(status) {
   if (kelvin) setText("kelvin", status.white);
 }
 
-function stepExposure(stops) {
-  if (view.status) change({ exposure_ev: Math.max(-100, Math.min(100, view.status.exposure_ev + stops)) });
+function showFov(status) {
+  if (!knowsAllChanges(status)) return;
+  const degrees = status.camera.fov_deg;
+  by("fov").value = degrees;
+  if (!isUsed(by("fov-number"))) by("fov-number").value = figure(degrees, 4);
 }
 
+by("fov").addEventListener("input", (event) => change({ fov_deg: Number(event.target.value) }));
+by("fov-number").addEventListener("change", (event) => {
+  const degrees = Number(event.target.value);
+  if (event.target.checkValidity() && degrees > 0) change({ fov_deg: degrees });
+  else say("The field of view goes from 0.01° to 175°.");
+});
 by("exposure").addEventListener("input", (event) => change({ exposure_ev: Number(event.target.value) }));
 by("exposure").addEventListener("dblclick", () => change({ exposure_ev: 0 }));
 by("white").addEventListener("change", (event) => {
@@ -89,7 +133,7 @@ by("white").addEventListener("change", (event) => {
   change({ white: white === "temperature" ? by("temperature").value + " K" : white });
 });
 by("temperature").addEventListener("input", (event) => change({ white: event.target.value + " K" }));
-by("pause").addEventListener("click", () => change({ paused: !(view.status && view.status.paused) }));
+by("pause").addEventListener("click", () => change({ toggle_paused: true }));
 by("count").addEventListener("change", (event) => {
   const samples = Number(event.target.value);
   if (Number.isInteger(samples) && samples >= 1) change({ samples });
@@ -105,20 +149,23 @@ by("copy").addEventListener("click", async () => {
     say("The browser gives no way to the clipboard: the text is selected instead.");
   }
 });
-by("save").addEventListener("click", async (event) => {
-  event.preventDefault();
+for (const [button, file] of [["save", "/image.exr"], ["save-png", "/image.png"]])
+  by(button).addEventListener("click", () => save(file));
+
+async function save(file) {
   try {
-    const reply = await fetch(address("/image.exr"));
+    await allArrived();
+    const reply = await fetch(address(file));
     if (!reply.ok) return say(await reply.text());
     const name = /filename="(.*)"/.exec(reply.headers.get("Content-Disposition"));
-    const link = element("a", "", { download: name ? name[1] : "image.exr" });
+    const link = element("a", "", { download: name ? name[1] : file.slice(1) });
     link.href = URL.createObjectURL(await reply.blob());
     link.click();
     setTimeout(() => URL.revokeObjectURL(link.href), 10000);
   } catch (error) {
     say("The image was not saved: " + error.message);
   }
-});
+}
 
 async function loadDevices() {
   const list = by("devices");
@@ -145,52 +192,6 @@ by("devices").addEventListener("change", (event) => {
   const [backend, device] = event.target.value.split("|");
   change({ backend, device });
 });
-
-function row(table, name, text) {
-  const line = element("tr");
-  line.append(element("th", name), element("td", text));
-  table.append(line);
-}
-
-async function askPixel(at) {
-  const status = view.status;
-  if (!status || !status.width) return;
-  const x = Math.floor(at[0] * status.width), y = Math.floor(at[1] * status.height);
-  const mark = by("mark"), box = canvas.getBoundingClientRect();
-  const frame = by("frame").getBoundingClientRect();
-  mark.style.left = box.left - frame.left + (x + 0.5) / status.width * box.width + "px";
-  mark.style.top = box.top - frame.top + (y + 0.5) / status.height * box.height + "px";
-  mark.hidden = false;
-  let reply;
-  try {
-    reply = await fetch(address("/pixel", { x, y }));
-  } catch (error) {
-    return say(error.message);
-  }
-  if (!reply.ok) return say(await reply.text());
-  showPixel(await reply.json());
-}
-
-function showPixel(pixel) {
-  const table = element("table");
-  const triple = (values) => values.map((v) => figure(v, 4)).join("  ");
-  row(table, "Pixel", pixel.x + ", " + pixel.y + (pixel.preview ? " (preview)" : ""));
-  row(table, "Radiance R G B", triple(pixel.rgb));
-  row(table, "X Y Z", triple(pixel.xyz));
-  if ("luminance_error" in pixel) row(table, "Error of Y", figure(pixel.luminance_error));
-  row(table, "Samples", String(pixel.samples));
-  if ("object" in pixel) row(table, "Object", pixel.object || "without a name");
-  if (pixel.material) row(table, "Material", pixel.material);
-  if ("primitive" in pixel) row(table, "Primitive", String(pixel.primitive));
-  if ("depth" in pixel) row(table, "Distance", figure(pixel.depth, 4));
-  const spectrum = pixel.spectrum || {};
-  for (const response of spectrum.responses || []) row(table, response.name, figure(response.value, 4));
-  by("pixel").className = "";
-  by("pixel").replaceChildren(table);
-  const svg = by("spectrum");
-  svg.toggleAttribute("hidden", !spectrum.radiance);
-  if (spectrum.radiance) drawSpectrum(svg, spectrum.wavelengths_nm, spectrum.radiance);
-}
 
 function shape(name, attributes, text = "") {
   const made = document.createElementNS("http://www.w3.org/2000/svg", name);

@@ -39,6 +39,7 @@ function layOut() {
   // Pixels are to be seen as such where they are large, and a preview is to look like the picture.
   const preview = view.picture && view.picture.divisor > 1;
   canvas.style.imageRendering = scale >= 3 && !preview ? "pixelated" : "auto";
+  placeMark();
 }
 
 function draw(status, pixels) {
@@ -52,7 +53,14 @@ function draw(status, pixels) {
   view.picture = picture;
   view.frames += 1;
   by("waiting").hidden = true;
+  drawScales(picture);
   if (resized) layOut();
+}
+
+/// Another program answers: what was asked of the one before is not meant for it.
+function forgetProgram() {
+  changes = noChanges();
+  probe.run = null;
 }
 
 async function look() {
@@ -65,6 +73,7 @@ async function look() {
   const length = new DataView(bytes).getUint32(0, true);
   const status = JSON.parse(new TextDecoder().decode(new Uint8Array(bytes, 4, length)));
   const before = view.status;
+  if (before && before.program !== status.program) forgetProgram();
   view.status = status;
   view.version = status.version;
   if (bytes.byteLength > 4 + length) draw(status, new Uint8ClampedArray(bytes, 4 + length));
@@ -72,6 +81,7 @@ async function look() {
   if (!before || before.width !== status.width || before.height !== status.height) layOut();
   setConnected(true);
   showStatus(status);
+  followPixel();
 }
 
 function setConnected(connected, why = "") {
@@ -102,35 +112,6 @@ async function keepLooking() {
       pause = Math.min(pause * 1.5, 2000);
     }
   }
-}
-
-let waitingChange = null;
-let sending = false;
-
-/// Gestures that come while a request is under way are added up.
-function mergedChange(one, other) {
-  const sum = { ...one, ...other };
-  for (const key of ["orbit", "pan"])
-    if (one[key] && other[key]) sum[key] = [one[key][0] + other[key][0], one[key][1] + other[key][1]];
-  if (one.dolly && other.dolly) sum.dolly = one.dolly * other.dolly;
-  return sum;
-}
-
-async function change(wish) {
-  waitingChange = waitingChange ? mergedChange(waitingChange, wish) : wish;
-  if (sending) return;
-  sending = true;
-  while (waitingChange) {
-    const body = JSON.stringify(waitingChange);
-    waitingChange = null;
-    try {
-      const reply = await fetch(address("/change"), { method: "POST", body });
-      if (!reply.ok) say(await reply.text());
-    } catch (error) {
-      setConnected(false, error.message);
-    }
-  }
-  sending = false;
 }
 
 let said = null;

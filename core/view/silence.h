@@ -1,0 +1,19 @@
+/// While it lives, no message of this thread reaches anybody.
+#pragma once
+
+#include "base/listener.h"
+
+#include <string_view>
+
+namespace crt {
+
+class Silence {
+public:
+    Silence() : listener_([](LogLevel, std::string_view) {}, LogLevel::Off), scope_(listener_) {}
+
+private:
+    const Listener listener_;
+    const ListenerScope scope_;
+};
+
+}  // namespace crt
