@@ -9,7 +9,7 @@ import time
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "cli"))
 
-from harness import LightTest, LIT  # noqa: E402
+from harness import LightTest, LIT, PATIENCE_SECONDS  # noqa: E402
 from view_client import View, without_alpha  # noqa: E402
 
 try:
@@ -22,7 +22,6 @@ if CHROMIUM is None:
     print("skipped: there is no Chromium (Debian: chromium)")
     sys.exit(77)
 
-PATIENCE_SECONDS = harness.PATIENCE_SECONDS
 DONE = "view.picture && view.picture.divisor === 1 && view.status.samples === view.status.samples_wanted" \
     " && view.picture.samples === view.status.samples && view.picture.of_this_camera && !sending" \
     " && knowsAllChanges(view.status)"
