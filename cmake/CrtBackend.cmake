@@ -50,6 +50,8 @@ function(crt_add_backend name)
     VISIBILITY_INLINES_HIDDEN ON
     LINK_DEPENDS ${_CRT_BACKEND_MAP}
     INSTALL_RPATH "$ORIGIN;$ORIGIN/.."
+    # Else CMake pads the path of the build tree with ':', and the loader searches the current folder.
+    BUILD_WITH_INSTALL_RPATH ON
     # Libraries outside the system's directories (the CUDA toolkit's) are still found once installed.
     INSTALL_RPATH_USE_LINK_PATH ON)
 

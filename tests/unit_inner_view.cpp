@@ -3,6 +3,7 @@
 #include "captured_log.h"
 #include "catch.h"
 #include "gltf_file_maker.h"
+#include "processor_time.h"
 #include "scene/import/import.h"
 #include "scene/import/inner_view.h"
 
@@ -152,6 +153,14 @@ TEST_CASE("what is no building is looked at from around", "[import]") {
 }
 
 // Fails when a format loses the choice, its materials or its placements on the way.
+TEST_CASE("twenty thousand triangles on one spot are looked at from around, in seconds",
+          "[import][limits]") {
+    std::vector<PaintedTriangle> triangles;
+    for (std::uint32_t i = 0; i < 20000; ++i)
+        triangles.emplace_back(Vec3d{0, 0, 0}, Vec3d{1, 0, 0}, Vec3d{0, 1, 0}, i);
+    CHECK(secondsOf([&] { CHECK_FALSE(innerView(triangles, 1)); }) < 4 * kSecondsAllowed);
+}
+
 TEST_CASE("a house as OBJ and as glTF is seen by a camera within it, with a lamp there", "[gltf][import]") {
     const TemporaryFolder folder;
     const auto importOf = [&](const std::string& path) {

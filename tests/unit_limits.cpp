@@ -1,9 +1,6 @@
-// What comes from outside has bounds: files that never end, files that others could have written, outputs
-// that would destroy something, geometry and light that arithmetic cannot carry.
-#include "backend/loader.h"
-#include "backend/sdk/kernel_cache.h"
+// What comes from outside has bounds: files that never end, outputs that would destroy something,
+// geometry and light that arithmetic cannot carry. Of code: unit_trust.cpp.
 #include "base/atomic_file.h"
-#include "base/code_trust.h"
 #include "base/error.h"
 #include "base/input_file.h"
 #include "base/vec3d.h"
@@ -12,6 +9,7 @@
 #include "compile/near_surfaces.h"
 #include "film/checkpoint.h"
 #include "image/image_io.h"
+#include "processor_time.h"
 #include "base/temporary_folder.h"
 #include "render/output_guard.h"
 #include "scene/mesh/mesh_io.h"
@@ -24,32 +22,17 @@
 
 #include <cmath>
 #include <cstdlib>
-#include <ctime>
 #include <filesystem>
 #include <fstream>
 #include <numbers>
 
 using namespace crt;
 using crt::TemporaryFolder;
+using crt::test::kSecondsAllowed;
+using crt::test::secondsOf;
 namespace fs = std::filesystem;
 
 namespace {
-
-// Of all processors together. What is quadratic takes minutes; what runs under a sanitizer, several times as
-// long as it should.
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-constexpr double kSecondsAllowed = 40;
-#else
-constexpr double kSecondsAllowed = 4;
-#endif
-
-/// Time of this process on processors: what else the machine does has no part in it.
-template <class Work>
-double secondsOf(const Work& work) {
-    const std::clock_t start = std::clock();
-    work();
-    return static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
-}
 
 /// The sentence of the crt::Error that `work` throws; empty when it throws none.
 template <class Work>
@@ -60,10 +43,6 @@ std::string refusal(const Work& work) {
         return error.what();
     }
     return {};
-}
-
-std::string kernelEntry(const plugin::KernelCache& cache, const std::string& name) {
-    return cache.path(plugin::KernelCache::makeKey({name}));
 }
 
 Film filmOf(std::uint64_t samples) {
@@ -179,74 +158,15 @@ TEST_CASE("an output link that leads to nothing yet stays a link", "[limits][out
     CHECK_THROWS_WITH(AtomicFile(folder / "loop"), Contains("leads to itself"));
 }
 
-// ---- Code -----------------------------------------------------------------------------------------------
-
-TEST_CASE("a kernel that others could have written is not loaded", "[limits][trust]") {
+TEST_CASE("a file whose name is as long as a name may be is written", "[limits][image_io]") {
     const TemporaryFolder folder;
-    const plugin::KernelCache cache(folder.path().c_str());
-    const auto key = plugin::KernelCache::makeKey({"a"});
-    const std::string entry = kernelEntry(cache, "a");
-    REQUIRE(cache.store(key, "code", 4));
-    std::string refused;
-    CHECK(cache.load(key, &refused));
-    CHECK(refused.empty());
-
-    REQUIRE(::chmod(entry.c_str(), 0666) == 0);
-    CHECK_FALSE(cache.load(key, &refused));
-    CHECK_THAT(refused,
-               Contains("everyone can write to '" + entry + "' (mode 0666)") && Contains("chmod go-w"));
-    REQUIRE(::chmod(entry.c_str(), 0600) == 0);
-    CHECK(cache.load(key));
-    if (::geteuid() == 0) {  // Only root gives files away.
-        REQUIRE(::chown(entry.c_str(), 65534, 65534) == 0);
-        CHECK_FALSE(cache.load(key, &refused));
-        CHECK_THAT(refused, Contains("belongs to another user"));
+    for (const std::size_t length : {std::size_t{230}, std::size_t{240}, std::size_t{255}}) {
+        const std::string path = folder / std::string(length, 'x');
+        AtomicFile file(path);
+        file.write("text", 4);
+        file.commit();
+        CHECK(fs::file_size(path) == 4);
     }
-    fs::remove(entry);
-    REQUIRE(::mkfifo(entry.c_str(), 0600) == 0);
-    CHECK_FALSE(cache.load(key, &refused));
-    CHECK_THAT(refused, Contains("is not a regular file"));
-    fs::remove(entry);
-    // A link is another's way to choose the file.
-    fs::create_symlink("/etc/passwd", entry);
-    CHECK_FALSE(cache.load(key));
-}
-
-TEST_CASE("a plugin that others could have written is not opened", "[limits][trust]") {
-    const TemporaryFolder folder;
-    const fs::path plugins = folder / "plugins";
-    fs::create_directory(plugins);
-    REQUIRE(::chmod(plugins.c_str(), 0755) == 0);
-    const std::string plugin = plugins / "crt_backend_fake.so";
-    fs::copy_file(CRT_FAKE_PLUGIN_DIR "/crt_backend_fake.so", plugin);
-    REQUIRE(::chmod(plugin.c_str(), 0755) == 0);
-    CHECK(refusal([&] { loadBackend(plugin); }).empty());
-
-    const auto refusedWith = [&](const std::string& path, mode_t mode) {
-        struct stat before {};
-        REQUIRE(::stat(path.c_str(), &before) == 0);
-        REQUIRE(::chmod(path.c_str(), mode) == 0);
-        const std::string sentence = refusal([&] { loadBackend(plugin); });
-        REQUIRE(::chmod(path.c_str(), before.st_mode) == 0);
-        return sentence;
-    };
-    CHECK_THAT(refusedWith(plugin, 0777),
-               Contains("is refused: everyone can write to '" + plugin + "' (mode 0777)"));
-    CHECK_THAT(refusedWith(plugins, 0777),
-               Contains("is refused: everyone can write to '" + plugins.string() + "'"));
-    CHECK_THAT(refusedWith(folder.path(), 0777),
-               Contains("is refused: everyone can write to '" + folder.path() + "'"));  // further up
-    CHECK(refusedWith(plugins, 01777).empty());  // sticky, as /tmp: users cannot replace what is another's
-    if (::geteuid() == 0) {
-        REQUIRE(::chown(plugin.c_str(), 65534, 65534) == 0);
-        CHECK_THAT(refusal([&] { loadBackend(plugin); }), Contains("belongs to another user"));
-        REQUIRE(::chown(plugin.c_str(), 0, 65534) == 0);
-        CHECK_THAT(refusedWith(plugin, 0775), Contains("the group") && Contains("can write to"));
-        REQUIRE(::chown(plugin.c_str(), 0, 0) == 0);
-        CHECK(refusedWith(plugin, 0775).empty());  // root's own group: a umask of 002
-    }
-    fs::create_symlink(plugin, folder / "link.so");
-    CHECK_THAT(refusal([&] { loadBackend(folder / "link.so"); }), !Contains("refused"));
 }
 
 // ---- Geometry and light ---------------------------------------------------------------------------------

@@ -11,18 +11,25 @@ using crt::wantsWavefront;
 
 TEST_CASE("waves are for several kinds of material in a tree, and for long ones", "[wavefront]") {
     constexpr std::uint64_t one = CRT_FEATURE_DIFFUSE | CRT_FEATURE_NEE;
-    CHECK_FALSE(wantsWavefront(one | CRT_FEATURE_BRUTE_FORCE));
-    CHECK_FALSE(wantsWavefront(one | CRT_FEATURE_BVH));
-    CHECK_FALSE(wantsWavefront(one | CRT_FEATURE_DIELECTRIC | CRT_FEATURE_BRUTE_FORCE));
-    CHECK(wantsWavefront(one | CRT_FEATURE_DIELECTRIC | CRT_FEATURE_BVH));
+    CHECK_FALSE(wantsWavefront(one | CRT_FEATURE_BRUTE_FORCE, 16));
+    CHECK_FALSE(wantsWavefront(one | CRT_FEATURE_BVH, 16));
+    CHECK_FALSE(wantsWavefront(one | CRT_FEATURE_DIELECTRIC | CRT_FEATURE_BRUTE_FORCE, 16));
+    CHECK(wantsWavefront(one | CRT_FEATURE_DIELECTRIC | CRT_FEATURE_BVH, 16));
     for (const std::uint64_t lengthy :
          {CRT_FEATURE_ROUGH_CONDUCTOR, CRT_FEATURE_ROUGH_DIELECTRIC, CRT_FEATURE_PLASTIC,
           CRT_FEATURE_CLEARCOAT, CRT_FEATURE_FUZZ, CRT_FEATURE_ROUGH_BASE, CRT_FEATURE_THIN_FILM}) {
-        CHECK(wantsWavefront(one | lengthy | CRT_FEATURE_BRUTE_FORCE));
+        CHECK(wantsWavefront(one | lengthy | CRT_FEATURE_BRUTE_FORCE, 16));
         // A view is no path.
-        CHECK_FALSE(wantsWavefront(one | lengthy | CRT_FEATURE_VIEW));
+        CHECK_FALSE(wantsWavefront(one | lengthy | CRT_FEATURE_VIEW, 16));
     }
-    CHECK_FALSE(wantsWavefront(CRT_FEATURES_ALL));
+    CHECK_FALSE(wantsWavefront(CRT_FEATURES_ALL, 16));
+}
+
+TEST_CASE("waves are for paths without end", "[wavefront]") {
+    constexpr std::uint64_t one = CRT_FEATURE_DIFFUSE | CRT_FEATURE_BRUTE_FORCE;
+    CHECK_FALSE(wantsWavefront(one, 1 << 16));
+    CHECK(wantsWavefront(one, 1'000'000'000));
+    CHECK_FALSE(wantsWavefront(one | CRT_FEATURE_VIEW, 1'000'000'000));
 }
 
 using crt::plugin::Entry;

@@ -1,5 +1,7 @@
 #include "backend/integrator.h"
 
+#include "backend/coverage.h"
+#include "backend/kernel_source.h"
 #include "base/error.h"
 #include "base/listener.h"
 #include "base/log.h"
@@ -43,71 +45,6 @@ const char* statusText(CrtStatus status) {
     }
 }
 
-using Rectangle = std::array<std::uint32_t, 4>;
-
-std::uint64_t areaOf(const Rectangle& r) { return std::uint64_t{r[2] - r[0]} * (r[3] - r[1]); }
-
-bool overlap(const Rectangle& a, const Rectangle& b) {
-    return a[0] < b[2] && b[0] < a[2] && a[1] < b[3] && b[1] < a[3];
-}
-
-/// Which samples the backend's film holds. A film knows ranges of samples that every pixel has; ranges
-/// rendered rectangle by rectangle are held back here until their rectangles cover the window.
-class Coverage {
-public:
-    Coverage() = default;
-    Coverage(std::uint32_t width, std::uint32_t height) : window_area_(std::uint64_t{width} * height) {}
-
-    /// Throws crt::Error(Usage) when a pixel would get a sample twice.
-    void add(SampleRange samples, const Rectangle& rectangle) {
-        if (areaOf(rectangle) == window_area_) {
-            for (const Part& part : parts_) {
-                if (part.samples.first < samples.second && samples.first < part.samples.second)
-                    twice(samples);
-            }
-            whole_.add(samples);
-            return;
-        }
-        // Refuses samples that are already there for all pixels.
-        SampleRanges(whole_).add(samples);
-        const auto same = std::find_if(parts_.begin(), parts_.end(),
-                                       [&](const Part& part) { return part.samples == samples; });
-        for (const Part& part : parts_) {
-            if (part.samples.first >= samples.second || samples.first >= part.samples.second) continue;
-            for (const Rectangle& other : part.rectangles) {
-                if (overlap(other, rectangle)) twice(samples);
-            }
-        }
-        Part& part = same != parts_.end() ? *same : parts_.emplace_back(Part{samples, {}, 0});
-        part.rectangles.push_back(rectangle);
-        part.area += areaOf(rectangle);
-        if (part.area == window_area_) {
-            // The rectangles do not overlap, so their areas tell.
-            whole_.add(samples);
-            parts_.erase(parts_.begin() + (&part - parts_.data()));
-        }
-    }
-
-    bool isWhole() const { return parts_.empty(); }
-    const SampleRanges& ranges() const { return whole_; }
-
-private:
-    struct Part {
-        SampleRange samples;
-        std::vector<Rectangle> rectangles;
-        std::uint64_t area;
-    };
-
-    [[noreturn]] static void twice(SampleRange samples) {
-        throw Error(ErrorKind::Usage, fmt::format("samples {}-{} would be rendered twice in some pixels",
-                                                  samples.first, samples.second));
-    }
-
-    std::uint64_t window_area_ = 0;
-    SampleRanges whole_;
-    std::vector<Part> parts_;
-};
-
 }  // namespace
 
 /// Lives on the heap and never moves: the plugin keeps the address of the host table.
@@ -136,6 +73,7 @@ struct Integrator::Impl {
     const std::function<bool(double)>* progress = nullptr;
     bool cancelled = false;
     std::exception_ptr progress_error;
+    std::exception_ptr kernel_error;
 
     Impl(const LoadedBackend& loaded, const IntegratorOptions& options)
         : backend(loaded), plain_host(makeHost(options.use_cache)), host(plain_host) {
@@ -157,6 +95,7 @@ struct Integrator::Impl {
         const CrtStatus status = call(
             "create", [&] { return backend.table->create(&host, &info, &table, reason, sizeof(reason)); });
         reason[sizeof(reason) - 1] = '\0';
+        tellKernelError(status);
         if (status != CRT_OK) {
             throw Error(kindOf(status), fmt::format("backend '{}' cannot be used: {}", backend.name,
                                                     *reason != '\0' ? reason : statusText(status)));
@@ -237,8 +176,26 @@ struct Integrator::Impl {
         }
     }
 
+    /// Why the plugin was given no text of a kernel, if that happened: thrown where the verb failed, for it
+    /// is the reason, and logged where the plugin goes on without.
+    void tellKernelError(CrtStatus status) {
+        std::exception_ptr error;
+        {
+            const std::lock_guard lock(caller_mutex);
+            error = std::exchange(kernel_error, nullptr);
+        }
+        if (!error) return;
+        if (status != CRT_OK) std::rethrow_exception(error);
+        try {
+            std::rethrow_exception(error);
+        } catch (const std::exception& refused) {
+            logMessage(LogLevel::Error, refused.what());
+        }
+    }
+
     /// Throws unless the verb succeeded, with the plugin's sentence.
     void check(CrtStatus status) {
+        tellKernelError(status);
         if (status == CRT_OK) return;
         const char* sentence = nullptr;
         call("last_error", [&] {
@@ -297,7 +254,14 @@ struct Integrator::Impl {
     static const char* onKernelSource(void* user, const char* name) noexcept {
         Impl& self = *static_cast<Impl*>(user);
         const ListenerScope scope(self.lastCaller());
-        return self.plain_host.kernel_source(nullptr, name);
+        try {
+            return name != nullptr ? kernelSource(name) : nullptr;
+        } catch (...) {
+            // Must not pass through the plugin, which says only that it has no text.
+            const std::lock_guard lock(self.caller_mutex);
+            self.kernel_error = std::current_exception();
+            return nullptr;
+        }
     }
     static std::int32_t onProgress(void* user, double done) noexcept {
         Impl& self = *static_cast<Impl*>(user);

@@ -34,10 +34,12 @@ std::optional<std::string> textIn(const std::string& directory, const std::strin
     constexpr std::uint64_t kMostBytes = std::uint64_t{16} << 20;
     const std::string path = directory + '/' + name;
     if (::access(path.c_str(), F_OK) != 0) return std::nullopt;
-    if (const std::string why = trust::whyNotByName(path); !why.empty())
-        throw Error(ErrorKind::Backend, fmt::format("the kernels of CRT_KERNEL_DIR are refused: {}", why));
+    const trust::Judged judged = trust::judge(path);
+    if (!judged.why.empty())
+        throw Error(ErrorKind::Backend,
+                    fmt::format("the kernels of CRT_KERNEL_DIR are refused: {}", judged.why));
     try {
-        return readInput(path, kMostBytes);
+        return readInput(judged.path, kMostBytes);
     } catch (const InputRefused& refused) {
         throw Error(ErrorKind::Backend, fmt::format("the kernel header '{}' {}", path, refused.what()));
     }

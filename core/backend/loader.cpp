@@ -192,12 +192,11 @@ bool isCut(const std::string& file) {
     return false;
 }
 
-/// What could have been written by others is not run.
-void refuseUntrusted(const std::string& name, const std::string& path) {
-    std::error_code unreadable;
-    if (!fs::exists(path, unreadable)) return;  // A link to nowhere: dlopen says so.
-    if (const std::string why = trust::whyNotByName(path); !why.empty())
-        refuse(fmt::format("backend '{}' ({}) is refused: {}", name, path, why));
+/// What is to be opened in place of `path`: what could have been written by others is not run.
+std::string trustedFile(const std::string& name, const std::string& path) {
+    const trust::Judged judged = trust::judge(path);
+    if (!judged.why.empty()) refuse(fmt::format("backend '{}' ({}) is refused: {}", name, path, judged.why));
+    return judged.path;
 }
 
 /// Existing and usable, made if need be; empty with a debug message otherwise.
@@ -292,12 +291,7 @@ LoadedBackend loadBackend(const std::string& name) {
         refuse(fmt::format("there is no backend file {}", name));
     }
 
-    refuseUntrusted(name, path);
-    // dlopen searches the system's directories for a name without '/'. Links are followed here: the way that
-    // was looked at is the one taken.
-    std::error_code unknown;
-    const fs::path real = fs::canonical(path, unknown);
-    const std::string file = unknown ? fs::absolute(path).string() : real.string();
+    const std::string file = trustedFile(name, path);
     if (isCut(file))
         refuse(fmt::format("backend '{}' ({}) cannot be opened: the file is cut short", name, path));
     // NOW: a missing symbol is told here and not in the middle of a render. LOCAL: the libraries of one
@@ -372,7 +366,7 @@ std::vector<BackendStatus> listBackends() {
         status.path = findPlugin(name).value_or("");
         try {
             status.refused =
-                !status.path.empty() && fs::exists(status.path) && !trust::whyNotByName(status.path).empty();
+                !status.path.empty() && fs::exists(status.path) && !trust::judge(status.path).why.empty();
             const LoadedBackend backend = loadBackend(name);
             status.version = orUnknown(backend.table->version);
             status.build = orUnknown(backend.table->build);

@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdio>
 #include <cstdlib>
@@ -87,6 +88,18 @@ constexpr const char* kStandardOutput = "standard output";
 
 bool isStandardOutput(const std::string& path) { return path == "-" || path.rfind("-.", 0) == 0; }
 
+namespace {
+
+/// A name of its own in the folder of a file: the file's, which is cut where both would be too long.
+std::string temporaryBeside(const std::string& file, int attempt) {
+    constexpr std::size_t kLongestName = 255;
+    const std::string end = fmt::format(".{}-{}.tmp", ::getpid(), attempt);
+    const std::size_t name = file.rfind('/') + 1;  // 0 without a folder.
+    return file.substr(0, std::min(file.size(), name + kLongestName - end.size())) + end;
+}
+
+}  // namespace
+
 AtomicFile::AtomicFile(const std::string& path) : path_(path), final_(path) {
     if (path.empty()) throw Error(ErrorKind::Output, "cannot write an output without a file name");
     if (isStandardOutput(path)) {
@@ -103,7 +116,7 @@ AtomicFile::AtomicFile(const std::string& path) : path_(path), final_(path) {
     // process id alone does not make the name unique: in a container every program may be process 1, and an
     // earlier one may have died here.
     for (int attempt = 0; descriptor_ < 0; ++attempt) {
-        temporary_ = fmt::format("{}.{}-{}.tmp", final_, ::getpid(), attempt);
+        temporary_ = temporaryBeside(final_, attempt);
         descriptor_ = ::open(temporary_.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
         const int error_number = errno;
         if (descriptor_ >= 0 || error_number == EINTR || (error_number == EEXIST && attempt < 1000))

@@ -1,5 +1,6 @@
 #include "base/code_trust.h"
 
+#include <dirent.h>
 #include <dlfcn.h>
 #include <fcntl.h>
 #include <grp.h>
@@ -8,11 +9,13 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <climits>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <memory>
 #include <vector>
 
 namespace crt::trust {
@@ -138,41 +141,118 @@ std::string whyNot(const struct stat& status, const std::string& name) {
 
 namespace {
 
-/// Why a folder, or a folder above it, may not hold code; empty if it may.
-std::string whyNotFrom(std::string folder) {
-    const std::string home = homeOfUser();
-    for (;; folder = folderOf(folder)) {
-        if (program().known && isAbove(folder, program().path)) return {};  // So are all further up.
-        struct stat status {};
-        if (::stat(folder.c_str(), &status) != 0)
-            return inQuotationMarks(folder) + " cannot be looked at: " + std::strerror(errno);
-        if (std::string why = whyNot(status, folder); !why.empty()) return why;
-        if (folder == "/" || folder == home) return {};
+std::string cannotBeOpened(const std::string& name, int error) {
+    return inQuotationMarks(name) + " cannot be opened: " + std::strerror(error);
+}
+
+/// Why a folder may not lead to code; empty if it may. `entry`: the path in it that is looked up next.
+std::string whyNotIn(const std::string& folder, const std::string& entry, const std::string& home) {
+    if (program().known && isAbove(folder, program().path)) return {};
+    if (isAbove(folder, home) && (entry == home || isAbove(entry, home))) return {};
+    struct stat status {};
+    if (::stat(folder.c_str(), &status) != 0)
+        return inQuotationMarks(folder) + " cannot be looked at: " + std::strerror(errno);
+    return whyNot(status, folder);
+}
+
+std::string below(const std::string& folder, const std::string& entry) {
+    return folder == "/" ? folder + entry : folder + '/' + entry;
+}
+
+/// Where a name leads, and whether somebody else could have chosen that.
+Judged follow(const std::string& name) {
+    constexpr int kMostLinks = 40;  // As Linux has it.
+    std::string rest = name;
+    if (name.empty() || name.front() != '/') {
+        char here[PATH_MAX];
+        if (::getcwd(here, sizeof here) == nullptr) return {{}, cannotBeOpened(name, errno)};
+        rest = std::string(here) + "/" + name;
     }
+    const std::string home = homeOfUser();
+    Judged way{std::string(1, '/'), {}};
+    int links = 0;
+    while (!rest.empty()) {
+        const std::size_t end = std::min(rest.find('/'), rest.size());
+        const std::string part = rest.substr(0, end);
+        rest.erase(0, end + 1);
+        if (part.empty() || part == ".") continue;
+        if (part == "..") {
+            way.path = folderOf(way.path);
+            continue;
+        }
+        const std::string entry = below(way.path, part);
+        if (way.why = whyNotIn(way.path, entry, home); !way.why.empty()) return way;
+        struct stat status {};
+        if (::lstat(entry.c_str(), &status) != 0) return {{}, cannotBeOpened(name, errno)};
+        if (!S_ISLNK(status.st_mode)) {
+            way.path = entry;
+            continue;
+        }
+        if (!trustedOwner(status.st_uid))
+            return {{},
+                    inQuotationMarks(entry) + " is a link of another user (" + nameOfUser(status.st_uid) +
+                        "), who could have made it lead anywhere"};
+        char target[PATH_MAX];
+        const ssize_t length = ::readlink(entry.c_str(), target, sizeof target);
+        if (length < 0) return {{}, cannotBeOpened(name, errno)};
+        if (++links > kMostLinks) return {{}, cannotBeOpened(name, ELOOP)};
+        rest = std::string(target, static_cast<std::size_t>(length)) + "/" + rest;
+        if (rest.front() == '/') way.path.assign(1, '/');
+    }
+    return way;
+}
+
+/// Why a file that was followed may not be run; `name`: as messages call it.
+std::string whyNotFile(const std::string& path, const std::string& name) {
+    // On the descriptor: not blocking, for a pipe waits for who writes to it.
+    const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY | O_NOFOLLOW);
+    if (descriptor < 0) return cannotBeOpened(name, errno);
+    struct stat status {};
+    const bool known = ::fstat(descriptor, &status) == 0;
+    ::close(descriptor);
+    return known && S_ISREG(status.st_mode) ? whyNot(status, name)
+                                            : inQuotationMarks(name) + " is not a regular file";
+}
+
+struct CloseFolder {
+    void operator()(DIR* folder) const { ::closedir(folder); }
+};
+
+/// The first reason within a folder; empty if there is none.
+std::string whyNotWithin(const std::string& path) {
+    struct stat status {};
+    if (::lstat(path.c_str(), &status) != 0) return cannotBeOpened(path, errno);
+    if (S_ISREG(status.st_mode)) return whyNotFile(path, path);
+    if (S_ISLNK(status.st_mode)) return judge(path).why;
+    if (!S_ISDIR(status.st_mode)) return inQuotationMarks(path) + " is neither a file nor a folder";
+    if (std::string why = whyNot(status, path); !why.empty()) return why;
+    const std::unique_ptr<DIR, CloseFolder> folder(::opendir(path.c_str()));
+    if (!folder) return cannotBeOpened(path, errno);
+    while (const dirent* const entry = ::readdir(folder.get())) {
+        const std::string name = entry->d_name;
+        if (name == "." || name == "..") continue;
+        if (std::string why = whyNotWithin(below(path, name)); !why.empty()) return why;
+    }
+    return {};
 }
 
 }  // namespace
 
-std::string whyNotByName(const std::string& path) {
-    char real[PATH_MAX];
-    if (::realpath(path.c_str(), real) == nullptr)
-        return inQuotationMarks(path) + " cannot be opened: " + std::strerror(errno);
-    // On the descriptor: not blocking, for a pipe waits for who writes to it.
-    const int descriptor = ::open(real, O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
-    if (descriptor < 0) return inQuotationMarks(path) + " cannot be opened: " + std::strerror(errno);
-    struct stat status {};
-    const bool known = ::fstat(descriptor, &status) == 0;
-    ::close(descriptor);
-    if (!known || !S_ISREG(status.st_mode)) return inQuotationMarks(path) + " is not a regular file";
-    const std::string why = whyNot(status, path);
-    return why.empty() ? whyNotFrom(folderOf(real)) : why;
+Judged judge(const std::string& name) {
+    Judged found = follow(name);
+    if (found.why.empty()) found.why = whyNotFile(found.path, name);
+    return found;
 }
 
-std::string whyNotFolder(const std::string& path) {
-    char real[PATH_MAX];
-    if (::realpath(path.c_str(), real) == nullptr)
-        return inQuotationMarks(path) + " cannot be opened: " + std::strerror(errno);
-    return whyNotFrom(real);
+Judged judgeTree(const std::string& name) {
+    Judged found = follow(name);
+    if (found.why.empty()) found.why = whyNotWithin(found.path);
+    return found;
+}
+
+std::string whyNotFolder(const std::string& name) {
+    const Judged found = follow(name);
+    return found.why.empty() ? whyNotIn(found.path, {}, homeOfUser()) : found.why;
 }
 
 }  // namespace crt::trust

@@ -124,8 +124,8 @@ std::string acceleratorText(const CompiledScene& compiled) {
     return compiled.triangles == 0 ? "none: there is nothing to hit" : "a loop over all triangles";
 }
 
-std::string scheduleText(const CompiledScene& compiled) {
-    return wantsWavefront(compiled.features)
+std::string scheduleText(const Scene& scene, const CompiledScene& compiled) {
+    return wantsWavefront(compiled.features, static_cast<std::uint32_t>(scene.integrator.max_depth))
                ? "cuda traces and shades by kernels of their own, paths sorted by material (--kernel lean)"
                : "one kernel takes a path to its end";
 }
@@ -153,7 +153,7 @@ void showScene(const SceneRequest& what) {
     printRow("sampler", fmt::format("{}, seed {}, {} samples per pixel", name(scene.sampler.type),
                                     scene.sampler.seed, scene.sampler.samples));
     printRow("accelerator", acceleratorText(compiled));
-    printRow("schedule", scheduleText(compiled));
+    printRow("schedule", scheduleText(scene, compiled));
     printRow("needs", featureNames(compiled.features));
     std::string left_out;
     for (const auto& [thing, why] : compiled.left_out)

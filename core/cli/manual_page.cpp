@@ -99,6 +99,9 @@ constexpr std::array kVariables{
     Variable{
         "CRT_SCENE_MEMORY",
         "The memory that a scene may take when its placements and aliases are written out, such as 20GB."},
+    Variable{"CRT_TABLE_SECONDS",
+             "The seconds of a processor that tables of rough materials may take before the first sample, "
+             "instead of 6."},
     Variable{"SOURCE_DATE_EPOCH", "Seconds since 1970 that images and films carry as their date."},
     Variable{"NO_COLOR", "Set to anything: crt verify prints without colours."},
 };

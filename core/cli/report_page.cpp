@@ -1,5 +1,6 @@
 #include "cli/report_page.h"
 
+#include "base/code_trust.h"
 #include "base/modules.h"
 #include "cli/arguments.h"
 
@@ -109,8 +110,12 @@ std::optional<std::string> makeReportPage(const std::string& folder) {
         return fmt::format("there is no page, as CRT_PYTHON asks; this makes it: {}", command);
     if (program.empty())
         return fmt::format("there is no page: its program is not installed; this makes it: {}", command);
+    const trust::Judged judged = trust::judgeTree(program);
+    if (!judged.why.empty())
+        return fmt::format("there is no page: its program is refused: {}; then this makes it: {}",
+                           judged.why, command);
     // -B: nothing is written where the program is installed.
-    const Ended ended = runProgram({python, "-B", program, std::filesystem::absolute(folder).string()});
+    const Ended ended = runProgram({python, "-B", judged.path, std::filesystem::absolute(folder).string()});
     if (ended.error == 0 && ended.status == 0) return std::nullopt;
     return fmt::format("there is no page: {}; this makes it: {}", whyNot(python, ended), command);
 }

@@ -7,35 +7,38 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 namespace crt {
 namespace {
 
-Coat makeCoat(double eta, double roughness) {
-    constexpr std::size_t cells = kSpectrumSize - 1;
-    const double alpha = roughness * roughness;
-    Coat coat;
-    coat.albedo = constantSpectrum(0);
+constexpr std::size_t kCoatCells = kSpectrumSize - 1;
+
+using CoatKey = std::pair<double, double>;
+
+double alphaOf(const CoatKey& key) { return key.second * key.second; }
+
+/// Whether the kernel asks Fresnel in place of a table.
+bool isSmooth(const CoatKey& key) {
+    return alphaOf(key) < static_cast<double>(CRT_ALPHA_MIN) || key.first == 1;
+}
+
+/// Gives a coat whose albedo is there the rest.
+void finish(const CoatKey& key, Coat& coat) {
+    const double eta = key.first;
     double mean = 0;
-    if (alpha < static_cast<double>(CRT_ALPHA_MIN) || eta == 1) {
+    if (isSmooth(key)) {
+        coat.albedo = constantSpectrum(0);
         mean = cosineMean(4096, [&](double c) { return dielectricReflectance(c, eta); });
     } else {
-        std::vector<double> table(kSpectrumSize);
-        parallelFor(table.size(), 16, [&](std::size_t first, std::size_t end) {
-            for (std::size_t i = first; i < end; ++i)
-                table[i] = coatAlbedo(std::max(static_cast<double>(i) / cells, 1e-4), eta, alpha);
-        });
-        for (std::size_t i = 0; i < table.size(); ++i) coat.albedo[i] = table[i];
-        mean = cosineMean(cells, [&](double c) {
-            const auto i = std::min(static_cast<std::size_t>(c * cells), cells - 1);
-            return table[i] + (c * cells - static_cast<double>(i)) * (table[i + 1] - table[i]);
+        const Spectrum& table = coat.albedo;
+        mean = cosineMean(kCoatCells, [&](double c) {
+            const auto i = std::min(static_cast<std::size_t>(c * kCoatCells), kCoatCells - 1);
+            return table[i] + (c * kCoatCells - static_cast<double>(i)) * (table[i + 1] - table[i]);
         });
     }
     coat.internal_reflectance = 1 - (1 - mean) / (eta * eta);
-    return coat;
 }
-
-using CoatKey = std::pair<double, double>;
 
 CoatKey coatKeyOf(const Material& plastic) { return {plastic.eta[0], plastic.roughness}; }
 CoatKey coatKeyOf(const Clearcoat& coat) { return {coat.ior, coat.roughness}; }
@@ -53,15 +56,49 @@ const Coat& coatOf(const Coats& coats, const Material& plastic) { return coats.a
 
 const Coat& coatOf(const Coats& coats, const Clearcoat& clearcoat) { return coats.at(coatKeyOf(clearcoat)); }
 
+namespace {
+
+/// Calls add(key, material) for each coat among the materials, equal ones as often as they are there.
+template <class Add>
+void forCoats(const std::vector<const Material*>& materials, const Add& add) {
+    for (const Material* material : materials) {
+        if (material && material->type == MaterialType::Plastic) add(coatKeyOf(*material), *material);
+        if (material && hasClearcoat(*material)) add(coatKeyOf(*material->clearcoat), *material);
+    }
+}
+
+}  // namespace
+
+void countCoats(const std::vector<const Material*>& materials, TableWork& work) {
+    // Fresnel's equations, with two roots for each direction, are dearer than shadowing.
+    constexpr double kSteps = 1.7 * kSpectrumSize * 32 * 128, kStepsOfSmooth = 3 * 4096;
+    std::set<CoatKey> known;
+    forCoats(materials, [&](const CoatKey& key, const Material& material) {
+        if (known.insert(key).second) work.add(isSmooth(key) ? kStepsOfSmooth : kSteps, material);
+    });
+}
+
 Coats coatsOf(const std::vector<const Material*>& materials) {
     Coats coats;
-    const auto add = [&](const CoatKey& key) {
-        if (!coats.contains(key)) coats.emplace(key, makeCoat(key.first, key.second));
-    };
-    for (const Material* material : materials) {
-        if (material && material->type == MaterialType::Plastic) add(coatKeyOf(*material));
-        if (material && hasClearcoat(*material)) add(coatKeyOf(*material->clearcoat));
+    forCoats(materials, [&](const CoatKey& key, const Material&) { coats.try_emplace(key); });
+    std::vector<std::pair<const CoatKey, Coat>*> all, rough;
+    for (auto& entry : coats) {
+        all.push_back(&entry);
+        if (!isSmooth(entry.first)) rough.push_back(&entry);
     }
+    std::vector<SpectrumValues::Array> albedos(rough.size());
+    parallelFor(rough.size() * kSpectrumSize, 16, [&](std::size_t first, std::size_t end) {
+        for (std::size_t n = first; n < end; ++n) {
+            const CoatKey& key = rough[n / kSpectrumSize]->first;
+            const std::size_t i = n % kSpectrumSize;
+            albedos[n / kSpectrumSize][i] =
+                coatAlbedo(std::max(static_cast<double>(i) / kCoatCells, 1e-4), key.first, alphaOf(key));
+        }
+    });
+    for (std::size_t i = 0; i < rough.size(); ++i) rough[i]->second.albedo.values = albedos[i];
+    parallelFor(all.size(), 1, [&](std::size_t first, std::size_t end) {
+        for (std::size_t i = first; i < end; ++i) finish(all[i]->first, all[i]->second);
+    });
     return coats;
 }
 

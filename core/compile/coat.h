@@ -2,6 +2,7 @@
 /// below, worked out before rendering.
 #pragma once
 
+#include "compile/table_work.h"
 #include "scene/scene.h"
 
 #include <map>
@@ -29,8 +30,9 @@ inline bool hasClearcoat(const Material& material) {
     return material.clearcoat && !material.isComposed() && !material.transmits();
 }
 
-/// Those of all plastics among the materials, and of what lies on any of them, each worked out once. Null
-/// materials are skipped.
+/// Those of all plastics among the materials, and of what lies on any of them, each worked out once, all at
+/// the same time. Null materials are skipped.
+void countCoats(const std::vector<const Material*>& materials, TableWork& work);
 Coats coatsOf(const std::vector<const Material*>& materials);
 
 /// E(θ): the share that GGX microfacets of width `alpha` on an interface of relative index `eta` mirror

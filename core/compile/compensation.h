@@ -3,6 +3,8 @@
 #pragma once
 
 #include "compile/blob_writer.h"
+#include "compile/loss_table.h"
+#include "compile/table_work.h"
 #include "kernel/layout.h"
 #include "scene/scene.h"
 
@@ -25,26 +27,18 @@ struct Anisotropy {
 Anisotropy anisotropyOf(const Material& material);
 
 struct Compensations {
-    /// Rows by roughness, of which equal ones are shared.
-    struct Table {
-        std::vector<float> rows;
-        kernel::CrtLoss record{};  ///< Without its place in the blob.
-    };
-    std::vector<Table> tables;
+    std::vector<LossTable> tables;
     std::map<const Material*, std::uint32_t> table_of;
     /// Of rough conductors: Fresnel's reflectance, its mean over the cosine.
     std::map<const Material*, Spectrum> mean_reflectance;
 };
 
-/// Those of all rough conductors and dielectrics among the materials. Null materials are skipped.
+/// Those of all rough conductors and dielectrics among the materials, equal ones worked out once, all at the
+/// same time. Null materials are skipped.
+void countCompensations(const std::vector<const Material*>& materials, TableWork& work);
 Compensations compensationsOf(const std::vector<const Material*>& materials);
 
 /// The tables as records of the blob, in their order.
 kernel::CrtSpan appendLosses(BlobWriter& blob, const Compensations& compensations);
-
-/// L(θ): the share of light towards a view at `cosine` that GGX microfacets of width `alpha` lose between
-/// them, mirrored (and, unless `eta` is 0, refracted) once, Smith's shadowing correlated by height. `eta`:
-/// index beyond over index before; 0: all light is mirrored.
-double microfacetLoss(double cosine, double eta, double alpha);
 
 }  // namespace crt

@@ -171,6 +171,11 @@ std::vector<const Material*> usedMaterials(const Scene& scene, const FlatScene& 
 }
 
 MaterialTables materialTablesOf(const std::vector<const Material*>& materials) {
+    TableWork work;
+    countCoats(materials, work);
+    countRoughBases(materials, work);
+    countCompensations(materials, work);
+    work.requireBounded();
     Coats coats = coatsOf(materials);
     RoughBases rough_bases = roughBasesOf(materials, coats);
     return {std::move(coats), compensationsOf(materials), std::move(rough_bases)};

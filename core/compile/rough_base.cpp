@@ -1,10 +1,13 @@
 #include "compile/rough_base.h"
 
+#include "base/parallel.h"
 #include "compile/reflectance.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
+#include <set>
 
 namespace crt {
 namespace {
@@ -63,11 +66,37 @@ RoughBase makeRoughBase(const Material& material, const Coat& coat) {
 
 }  // namespace
 
+namespace {
+
+/// What a base depends on: index and roughness of the coat, its own roughness.
+std::array<double, 3> keyOf(const Material& plastic) {
+    return {plastic.eta[0], plastic.roughness, plastic.diffuse_roughness};
+}
+
+}  // namespace
+
+void countRoughBases(const std::vector<const Material*>& materials, TableWork& work) {
+    constexpr double kSteps = 4 * 32 * kSpectrumSize;
+    std::set<std::array<double, 3>> known;
+    for (const Material* material : materials)
+        if (material && hasRoughBase(*material) && known.insert(keyOf(*material)).second)
+            work.add(kSteps, *material);
+}
+
 RoughBases roughBasesOf(const std::vector<const Material*>& materials, const Coats& coats) {
+    std::map<std::array<double, 3>, std::size_t> known;
+    std::vector<const Material*> different;
+    for (const Material* material : materials)
+        if (material && hasRoughBase(*material) && known.try_emplace(keyOf(*material), known.size()).second)
+            different.push_back(material);
+    std::vector<RoughBase> made(different.size());
+    parallelFor(different.size(), 1, [&](std::size_t first, std::size_t end) {
+        for (std::size_t i = first; i < end; ++i)
+            made[i] = makeRoughBase(*different[i], coatOf(coats, *different[i]));
+    });
     RoughBases bases;
     for (const Material* material : materials)
-        if (material && hasRoughBase(*material))
-            bases.emplace(material, makeRoughBase(*material, coatOf(coats, *material)));
+        if (material && hasRoughBase(*material)) bases.emplace(material, made[known.at(keyOf(*material))]);
     return bases;
 }
 

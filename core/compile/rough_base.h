@@ -24,7 +24,8 @@ struct RoughBase {
 };
 using RoughBases = std::map<const Material*, RoughBase>;
 
-/// Of all plastics that have one. Null materials are skipped.
+/// Of all plastics that have one, equal ones worked out once. Null materials are skipped.
+void countRoughBases(const std::vector<const Material*>& materials, TableWork& work);
 RoughBases roughBasesOf(const std::vector<const Material*>& materials, const Coats& coats);
 
 }  // namespace crt

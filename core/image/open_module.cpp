@@ -26,11 +26,12 @@ const CrtImageModule& imageModule(const std::string& path, ErrorKind kind) {
             const std::string file = directory + "/" CRT_IMAGE_MODULE_FILE;
             std::error_code ignored;
             if (!std::filesystem::exists(file, ignored)) continue;
-            if (const std::string why = trust::whyNotByName(file); !why.empty()) {
-                o.reason = fmt::format("the image module is refused: {}", why);
+            const trust::Judged judged = trust::judge(file);
+            if (!judged.why.empty()) {
+                o.reason = fmt::format("the image module is refused: {}", judged.why);
                 return o;
             }
-            void* const library = ::dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL);
+            void* const library = ::dlopen(judged.path.c_str(), RTLD_NOW | RTLD_LOCAL);
             if (library == nullptr) {
                 o.reason = fmt::format("the image module cannot be opened ({})", ::dlerror());
                 return o;

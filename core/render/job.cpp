@@ -270,7 +270,9 @@ int runJob(const Job& job, Watch& watch) {
     if (facts.error) tellTarget(facts);
     if (!facts.outputs.empty()) logInfo("wrote {}", fmt::join(facts.outputs, ", "));
     if (failure.get()) throw *failure.get();
-    if (facts.stop == StopReason::Interrupted)
+    if (facts.stop == StopReason::Interrupted && run.film.samples.count() == 0)
+        logInfo("stopped by {} before all pixels had a sample: there is no image", facts.request.cause);
+    else if (facts.stop == StopReason::Interrupted)
         logInfo("stopped by {}; the same command with --resume {} goes on from here", facts.request.cause,
                 files.saved);
     return facts.exit_code;

@@ -211,6 +211,7 @@ void SceneOnDevices::renderSamples(const SamplingPlan& plan, Watch& watch, const
     facts.devices = session_->group().shares();
     facts.film_bands = devices_->bands();
     facts.stop = result.stop;
+    facts.gave_up = result.gave_up;
     facts.request = result.request;
     facts.rendered_samples = result.rendered;
     facts.chunks = result.chunks;
@@ -222,7 +223,7 @@ Rendered SceneOnDevices::render(const SamplingPlan& plan, std::optional<EarlierF
                                 const CheckpointPlan& checkpoints) {
     try {
         Rendered run = rendered(plan, std::move(earlier), watch, checkpoints);
-        if (run.failure) close();
+        if (run.failure || run.facts.gave_up) close();
         return run;
     } catch (...) {
         close();  // They may be lost.

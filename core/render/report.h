@@ -44,6 +44,7 @@ struct RunFacts {
     double target_error = 0;            ///< 0: none.
 
     StopReason stop = StopReason::Samples;
+    bool gave_up = false;  ///< SamplingResult::gave_up
     StopRequest request;  ///< With StopReason::Interrupted.
     std::string failure;  ///< The sentence, when something failed.
     int exit_code = 0;

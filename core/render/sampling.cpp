@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <bit>
 #include <chrono>
+#include <mutex>
 #include <new>
 #include <system_error>
 #include <utility>
@@ -26,6 +27,9 @@ constexpr std::uint64_t kChunkGrowth =
 constexpr double kReadShare =
     0.02;  // Of the time may go into reading the film back for safety and for the error estimate.
 constexpr double kReadBytesPerSecond = 2e9; // First guess of what reading costs; measured from then on.
+
+/// Thrown through a chunk that is not waited for any more.
+struct ChunkGivenUp {};
 
 /// How many samples the next chunk should have.
 class ChunkSizer {
@@ -57,6 +61,48 @@ private:
     double last_seconds_ = 0, fixed_seconds_ = 0;
 };
 
+/// Decides that a chunk is given up: one that goes on too long after something has asked it to stop. A
+/// sample may take hours, and a path without end never comes back.
+class Patience {
+public:
+    explicit Patience(std::function<bool()> asked_to_stop) : asked_to_stop_(std::move(asked_to_stop)) {}
+
+    void chunkBegins() {
+        const std::lock_guard lock(mutex_);
+        began_at_ = advanced_at_ = Clock::now();
+        furthest_ = -1;
+        stop_at_.reset();
+    }
+
+    /// Throws ChunkGivenUp. `done`: of the chunk. [any thread]
+    void look(double done) {
+        const std::lock_guard lock(mutex_);
+        const Clock::time_point now = Clock::now();
+        if (done > furthest_) {
+            furthest_ = done;
+            advanced_at_ = now;
+        }
+        // Shorter ones end by themselves.
+        if (now - began_at_ < kShortChunk) return;
+        if (!stop_at_) {
+            if (!asked_to_stop_()) return;
+            stop_at_ = now;
+        }
+        const bool stands_still = now - std::max(advanced_at_, *stop_at_) >= kStandstill;
+        const bool takes_too_long = now - *stop_at_ >= kLongest + (*stop_at_ - began_at_);
+        if (stands_still || takes_too_long) throw ChunkGivenUp();
+    }
+
+private:
+    static constexpr std::chrono::seconds kShortChunk{1}, kStandstill{5}, kLongest{60};
+
+    std::function<bool()> asked_to_stop_;
+    std::mutex mutex_;
+    Clock::time_point began_at_, advanced_at_;
+    double furthest_ = -1;
+    std::optional<Clock::time_point> stop_at_;
+};
+
 /// The film on the host, kept close behind the one on the device.
 class FilmReader {
 public:
@@ -80,6 +126,7 @@ public:
     /// The same without looking at the error: the device waits for no more than the copy.
     void copy() {
         current_ = true;
+        unread_.clear();
         if (devices_.inBands()) {
             before_.reset();
             devices_.readFilm(film_);
@@ -98,7 +145,18 @@ public:
         read_at_ = Clock::now();
     }
 
-    void deviceAdvanced() { current_ = false; }
+    void deviceAdvanced(SampleRange samples) {
+        current_ = false;
+        unread_.push_back(samples);
+    }
+    /// What the device has rendered since it was last read.
+    std::vector<SampleRange> takeUnread() { return std::exchange(unread_, {}); }
+    /// The device's film is empty again.
+    void deviceRestarted() {
+        current_ = true;
+        before_.reset();
+        if (film_.samples.count() > 0) before_ = film_;
+    }
     /// Is it time to read again, within the share of time that reading may take?
     bool due() const { return !current_ && secondsSince(read_at_) >= read_seconds_ / kReadShare; }
     bool current() const { return current_; }
@@ -116,6 +174,7 @@ private:
     std::optional<Film> before_, next_;
     double read_seconds_;
     std::optional<ErrorEstimate> error_;
+    std::vector<SampleRange> unread_;
     Clock::time_point read_at_ = Clock::now();
     bool current_ = true;  // The device's film begins empty.
 };
@@ -175,31 +234,39 @@ SamplingResult sampleFilm(DeviceFilm& devices, Film& film, const SamplingPlan& p
         return reachesTarget(film, plan.target_error, plan.paths);
     };
 
-    // Why to stop before the samples are there; nothing while there is no reason.
-    const auto reasonToStop = [&]() -> std::optional<StopReason> {
+    // Why to stop before the samples are there, and even within a chunk; nothing while there is no reason.
+    const auto reasonToHurry = [&]() -> std::optional<StopReason> {
         if (const std::optional<StopRequest> request = watch.stopRequested()) {
             result.request = *request;
             return StopReason::Interrupted;
         }
         if (plan.time_limit_seconds > 0 && secondsSince(start) >= plan.time_limit_seconds)
             return StopReason::Time;
+        return std::nullopt;
+    };
+    const auto reasonToStop = [&]() -> std::optional<StopReason> {
+        if (const auto reason = reasonToHurry()) return reason;
         if (targetReached()) return StopReason::Target;
         return std::nullopt;
     };
+    Patience patience([&] { return reasonToHurry().has_value(); });
 
     const auto renderChunk = [&](std::uint64_t first, std::uint64_t count) {
         const Clock::time_point chunk_start = Clock::now();
         // Called from the plugin's threads: works on its own copy of the state.
-        const auto show = [&watch, start, count, before = state](double done) {
+        const auto show = [&watch, &patience, start, count, before = state](double done) {
+            patience.look(done);
             ProgressState now = before;
             now.samples += std::clamp(done, 0.0, 1.0) * static_cast<double>(count);
             now.elapsed_seconds = secondsSince(start);
             watch.progress(now);
         };
+        patience.chunkBegins();
         show(0);
         devices.render({.first_sample = first, .sample_count = count}, show);
+        patience.chunkBegins();  // What is done is not given up.
         show(1);  // Of a plugin's threads the last to finish need not be the last to have said so.
-        reader.deviceAdvanced();
+        reader.deviceAdvanced({first, first + count});
         // In bands nothing of it is on the devices any more, and a failure later shall not cost it.
         const bool due = reader.due();
         if (devices.inBands()) reader.copy();
@@ -235,14 +302,49 @@ SamplingResult sampleFilm(DeviceFilm& devices, Film& film, const SamplingPlan& p
         return StopReason::Samples;
     };
 
+    // A device whose chunk was given up holds a part of it, and cannot be read: what it had before is
+    // rendered again, which takes no longer than it did.
+    const auto recoverUnread = [&] {
+        const std::vector<SampleRange> lost = reader.takeUnread();
+        if (lost.empty() || devices.inBands()) return;
+        devices.setScene();
+        reader.deviceRestarted();
+        for (const auto& [first, end] : lost) {
+            patience.chunkBegins();
+            devices.render({.first_sample = first, .sample_count = end - first},
+                           [&patience](double done) { patience.look(done); });
+            reader.deviceAdvanced({first, end});
+        }
+        reader.copy();
+    };
+    const auto loseUnread = [&] { result.rendered = film.samples.count() - resumed; };
     const auto fail = [&](const Error& error) {
         result.stop = StopReason::Failed;
         result.failure = error;
-        result.rendered = film.samples.count() - resumed;  // What was rendered but not read is lost.
+        loseUnread();
     };
     try {
         result.stop = renderAll();
         if (!reader.current()) reader.copy();
+    } catch (const ChunkGivenUp&) {
+        result.gave_up = true;
+        result.stop = reasonToHurry().value_or(StopReason::Time);
+        try {
+            recoverUnread();
+        } catch (const ChunkGivenUp&) {
+            logDebug("some of the samples before are lost, too");
+        } catch (const std::exception& error) {
+            logWarning("some of the samples before are lost, too: {}", error.what());
+        }
+        loseUnread();
+        if (film.samples.count() == 0 && result.stop == StopReason::Time)
+            fail(Error(ErrorKind::Usage,
+                       fmt::format("not all pixels have a sample after {:.0f} s, and the time is up; give "
+                                   "more --time, or lower integrator.max_depth or film.resolution",
+                                   secondsSince(start))));
+        else
+            logWarning("the samples that were being taken are left out: they took too long after the render "
+                       "was to stop");
     } catch (const Error& error) {
         fail(error);
     } catch (const std::bad_alloc&) {

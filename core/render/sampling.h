@@ -34,7 +34,7 @@ enum class StopReason {
 struct SamplingPlan {
     std::vector<SampleRange> ranges;     ///< To render, in order.
     std::uint64_t target = 0;  ///< Samples per pixel in the film when all ranges are there; 0: endless.
-    double time_limit_seconds = 0;       ///< 0: none. Looked at between chunks.
+    double time_limit_seconds = 0;       ///< 0: none. Looked at between chunks, as a Watch is.
     PathFacts paths;                     ///< For the error of the film.
     bool light_is_missing = false;       ///< The error does not contain it: said with it.
     double target_error = 0;  ///< Stop when half_width_95 (error_estimate.h) is at most this; 0: never.
@@ -51,6 +51,7 @@ struct SamplingResult {
     std::uint64_t rendered = 0;     ///< Samples per pixel added to the film.
     std::uint64_t chunks = 0;
     double seconds = 0;
+    bool gave_up = false;  ///< A chunk was not waited for: the devices need the scene again.
 };
 
 /// The target error is looked at when the film holds a power of two of samples per pixel, at least 64 and a
@@ -68,6 +69,10 @@ bool reachesTarget(const Film& film, double target, const PathFacts& paths = {})
 /// at most a small part of the run behind: a backend that failed cannot be asked for its film any more.
 /// `checkpoint` may save the film, which is up to date when it is called. In bands (device_film.h) chunks
 /// are longer: what a chunk costs besides its samples shall be no more than a fifth of it.
+///
+/// A chunk that runs when the render is to stop is finished. It is given up, and `film` holds the chunks
+/// before it, where it stands still for 5 s, or takes longer after that moment than before it and a minute.
+/// Where the time is up and `film` has no sample yet, that is a failure.
 SamplingResult sampleFilm(DeviceFilm& devices, Film& film, const SamplingPlan& plan, Watch& watch,
                           const std::function<void()>& checkpoint);
 

@@ -31,7 +31,7 @@ struct ProgressState {
     double secondsLeft() const;
 };
 
-/// A request to stop after the chunk that is being rendered.
+/// A request to stop after the chunk that is being rendered, unless it takes too long (sampling.h).
 struct StopRequest {
     std::string cause;  ///< For the report and the log: "SIGINT", "the caller".
     int exit_code = 1;  ///< That a command returns which was stopped so.
@@ -51,7 +51,7 @@ public:
     virtual void renderingEnds() {}
     /// Called often; cheap in every implementation. [any thread]
     virtual void progress(const ProgressState&) {}
-    /// Asked between chunks. Nothing: go on. [any thread]
+    /// Asked between chunks, and within long ones. Nothing: go on. [any thread]
     virtual std::optional<StopRequest> stopRequested() { return std::nullopt; }
 };
 

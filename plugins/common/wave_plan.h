@@ -134,7 +134,7 @@ void inBands(const Launch& launch, std::uint64_t slots, std::uint64_t across, Ru
 }
 
 /// Runs passes until all slots of a wave are done. `pass(number)` starts one; `done()` waits for those that
-/// were started and says how many slots are done.
+/// were started and says how many slots are done. It may throw: then the wave stays as it is.
 template <class Pass, class Done>
 void runPasses(const kernel::CrtWave& wave, Pass&& pass, Done&& done) {
     /// Between two looks at how many slots are done. A pass without any costs a few microseconds.

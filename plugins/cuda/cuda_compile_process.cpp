@@ -201,7 +201,7 @@ CompileProcess::CompileProcess(const std::string& program, const CompileJob& job
     message.writeTo(request.get());
     ::lseek(request.get(), 0, SEEK_SET);
     Descriptor answer(sharedMemory("crt kernel"));
-    process_ = spawn(program, request.get(), answer.get());
+    process_ = spawn(plugin::trustedProgram(program), request.get(), answer.get());
     answer_ = answer.release();
 }
 

@@ -95,7 +95,7 @@ void CudaIntegrator::setScene(const CrtSceneBlob& blob) {
     scene_ = scene;
 
     std::vector<KernelSpec> wanted;
-    if (kernel_choice_ != CRT_KERNEL_FULL && wantsWavefront(scene.features)) {
+    if (kernel_choice_ != CRT_KERNEL_FULL && wantsWavefront(scene.features, scene.max_depth)) {
         wavefront_.emplace(device_, blob.data);
         wanted = wavefront_->plan().kernels;
     } else if (kernel_choice_ != CRT_KERNEL_FULL) {
@@ -111,7 +111,10 @@ void CudaIntegrator::setScene(const CrtSceneBlob& blob) {
             compile_seconds_ += program_->compileSeconds();
             cache_seconds_ += program_->cacheSeconds();
         }
-        program_ = std::make_unique<CudaProgram>(host_, device_, wanted, kernel_choice_);
+        // What is rendered with while waves are compiled takes a path to its end.
+        const bool waits = kernel_choice_ == CRT_KERNEL_LEAN && mayOutlastLaunch(scene.max_depth);
+        program_ = std::make_unique<CudaProgram>(host_, device_, wanted,
+                                                 waits ? CRT_KERNEL_LEAN_ONLY : kernel_choice_);
     }
 
     const double start = now();
@@ -199,8 +202,9 @@ void CudaIntegrator::launchKernels(const std::vector<Module>& kernels, const Lau
     const DeviceFilm& film = slices > 1 ? slices_ : film_;
     const WaveTarget target{blob_.address(), film.sums.address(), film.counts.address(),
                             film.primitives.address(), rays_.address()};
+    plugin::LaunchWatch watch(host_, pacer_.done());
     if (waves)
-        wavefront_->launch(kernels, scene_, launch, slices, target);
+        wavefront_->launch(kernels, scene_, launch, slices, target, [&watch] { watch.look(); });
     else
         launchRender(module, launch, slices, target);
     if (slices > 1) addSlices(module, launch, slices);

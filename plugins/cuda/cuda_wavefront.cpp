@@ -95,7 +95,8 @@ void Wavefront::runPass(const std::vector<Module>& kernels, kernel::CrtScene sce
 }
 
 void Wavefront::runWave(const std::vector<Module>& kernels, const kernel::CrtScene& scene,
-                        const kernel::CrtWave& wave, CUdeviceptr blob) const {
+                        const kernel::CrtWave& wave, CUdeviceptr blob,
+                        const std::function<void()>& meanwhile) const {
     const Driver& cuda = driver();
     const auto finished = reinterpret_cast<CUdeviceptr>(wave.finished);
     cuda.check(cuda.cuMemsetD8(reinterpret_cast<CUdeviceptr>(wave.lengths), 0,
@@ -107,18 +108,20 @@ void Wavefront::runWave(const std::vector<Module>& kernels, const kernel::CrtSce
             std::uint32_t done = 0;
             cuda.check(cuda.cuMemcpyDtoH(&done, finished, sizeof done),
                        "rendering on '" + device_.name + "'");
+            if (done < wave.slots) meanwhile();
             return done;
         });
 }
 
 void Wavefront::launch(const std::vector<Module>& kernels, const kernel::CrtScene& scene,
-                       const Launch& launch, std::uint32_t slices, const WaveTarget& target) {
+                       const Launch& launch, std::uint32_t slices, const WaveTarget& target,
+                       const std::function<void()>& meanwhile) {
     // Slots of one row of blocks, and rows of blocks that there is room for.
     const std::uint64_t across = divideUp(launch.x1 - launch.x0, kBlockWidth) * slices * CRT_WAVE_BLOCK;
     const std::uint64_t down = divideUp(launch.y1 - launch.y0, kBlockHeight);
     const std::uint64_t slots = ensureSlots(std::min(across * down, std::max(kMostSlots, across)), across);
     plugin::inBands(launch, slots, across, [&](const Launch& part) {
-        runWave(kernels, scene, waveOf(part, slices, target), target.blob);
+        runWave(kernels, scene, waveOf(part, slices, target), target.blob, meanwhile);
     });
 }
 

@@ -9,6 +9,7 @@
 #include "kernel/wavefront.h"
 
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 namespace crt::cuda {
@@ -30,9 +31,10 @@ public:
     std::uint32_t mostSlices(std::uint64_t blocks_across) const;
 
     /// Takes all samples of a launch, each of `slices` equal parts into a film of its own. `kernels`: those
-    /// of plan(). Waits for the end. Throws PluginError: CRT_OUT_OF_MEMORY before anything is added.
+    /// of plan(). Waits for the end, and calls `meanwhile` between passes, which may throw. Throws
+    /// PluginError: CRT_OUT_OF_MEMORY before anything is added.
     void launch(const std::vector<Module>& kernels, const kernel::CrtScene& scene, const Launch& launch,
-                std::uint32_t slices, const WaveTarget& target);
+                std::uint32_t slices, const WaveTarget& target, const std::function<void()>& meanwhile);
 
 private:
     /// Room for at least so many slots, or for as many as memory allows.
@@ -41,7 +43,8 @@ private:
     void runPass(const std::vector<Module>& kernels, kernel::CrtScene scene, kernel::CrtWave wave,
                  CUdeviceptr blob, std::uint32_t pass) const;
     void runWave(const std::vector<Module>& kernels, const kernel::CrtScene& scene,
-                 const kernel::CrtWave& wave, CUdeviceptr blob) const;
+                 const kernel::CrtWave& wave, CUdeviceptr blob,
+                 const std::function<void()>& meanwhile) const;
 
     const Device& device_;
     plugin::WavePlan plan_;

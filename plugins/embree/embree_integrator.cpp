@@ -131,6 +131,12 @@ bool EmbreeIntegrator::render(const CrtRenderRange& range) {
     std::mutex progress_mutex;
     const double all = static_cast<double>(columns) * rows *
                        static_cast<double>(std::max<std::uint64_t>(range.sample_count, 1));
+    // One thread at a time tells the host; the others have better things to do than wait.
+    const auto tell = [&] {
+        const std::unique_lock lock(progress_mutex, std::try_to_lock);
+        if (lock.owns_lock() && host_.cancelled(static_cast<double>(done.load()) / all)) cancelled = true;
+        return cancelled.load(std::memory_order_relaxed);
+    };
     arena_.execute([&] {
         tbb::parallel_for(
             tbb::blocked_range<std::uint32_t>(0, columns * rows, 1),
@@ -146,6 +152,8 @@ bool EmbreeIntegrator::render(const CrtRenderRange& range) {
                     job.sums = sums_.data();
                     job.counts = counts_.data();
                     job.primitives = primitives_.empty() ? nullptr : primitives_.data();
+                    job.cancelled = [](void* host) { return (*static_cast<decltype(tell)*>(host))(); };
+                    job.host = const_cast<void*>(static_cast<const void*>(&tell));
                     for (std::uint64_t s = 0;
                          s < range.sample_count && !cancelled.load(std::memory_order_relaxed);
                          s += kSamplesPerJob) {
@@ -156,11 +164,7 @@ bool EmbreeIntegrator::render(const CrtRenderRange& range) {
                         closest += rays.closest;
                         shadow += rays.shadow;
                         done += job.sample_count;
-                        // One thread at a time tells the host; the others have better things to do than
-                        // wait.
-                        const std::unique_lock lock(progress_mutex, std::try_to_lock);
-                        if (lock.owns_lock() && host_.cancelled(static_cast<double>(done.load()) / all))
-                            cancelled = true;
+                        tell();
                     }
                 }
             },

@@ -20,6 +20,8 @@ struct TileJob {
     double* sums;
     kernel::u64* counts;
     std::uint32_t* primitives;
+    bool (*cancelled)(void* host);  ///< Asked now and then; true: the job may end at any place.
+    void* host;
 };
 
 struct RayTotals {

@@ -34,14 +34,25 @@ using namespace kernel;
     return crt_pixel_vertex(&ctx, &work, &rays) != 0;
 }
 
+// A path may have no end: every so many rays the host is asked whether it still wants it.
+bool isCancelled(const TileJob& job, const CrtRayCount& rays) {
+    constexpr u32 kRaysBetweenLooks = 1u << 16;
+    return rays.closest % kRaysBetweenLooks == 0 && job.cancelled(job.host);
+}
+
 // Two pixels in turn, vertex by vertex: a path is one long chain of dependent operations, and while it waits
-// the processor works on the other's.
-void renderPair(const CrtContext& ctx, CrtPixelWork& a, CrtPixelWork& b, CrtRayCount& rays) {
-    while (advance(ctx, a, rays) && advance(ctx, b, rays)) continue;
-    while (advance(ctx, a, rays)) continue;
-    while (advance(ctx, b, rays)) continue;
+// the processor works on the other's. Returns false where the host cancelled.
+bool renderPair(const TileJob& job, const CrtContext& ctx, CrtPixelWork& a, CrtPixelWork& b,
+                CrtRayCount& rays) {
+    while (advance(ctx, a, rays) && advance(ctx, b, rays))
+        if (isCancelled(job, rays)) return false;
+    while (advance(ctx, a, rays))
+        if (isCancelled(job, rays)) return false;
+    while (advance(ctx, b, rays))
+        if (isCancelled(job, rays)) return false;
     crt_pixel_end(&a);
     crt_pixel_end(&b);
+    return true;
 }
 
 }  // namespace
@@ -61,9 +72,10 @@ RayTotals CRT_EMBREE_ENTRY(const TileJob& job) {
             CrtRayCount rays{0, 0};
             CrtPixelWork first = pixel(x, y), second = pixel(std::min(x + 1, job.x1 - 1), y);
             if (x + 1 == job.x1) second.sample_count = 0;  // A row of odd length: the last pixel is alone.
-            renderPair(ctx, first, second, rays);
+            const bool done = renderPair(job, ctx, first, second, rays);
             totals.closest += rays.closest;
             totals.shadow += rays.shadow;
+            if (!done) return totals;
         }
     }
     return totals;

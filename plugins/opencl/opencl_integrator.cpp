@@ -113,7 +113,7 @@ void OpenClIntegrator::setScene(const CrtSceneBlob& blob) {
     const bool full = kernel_choice_ == CRT_KERNEL_FULL;
     std::vector<plugin::KernelSpec> wanted{
         {plugin::Entry::Render, full ? std::uint64_t{CRT_FEATURES_ALL} : scene.features}};
-    if (!full && wantsWavefront(scene.features) && takesWaves(device_)) {
+    if (!full && wantsWavefront(scene.features, scene.max_depth) && takesWaves(device_, scene.max_depth)) {
         const std::uint64_t allocated = allocated_bytes_;
         try {
             wavefront_.emplace(device_, session_, blob.data, [this](std::uint64_t bytes, const char* what) {
@@ -161,8 +161,10 @@ double OpenClIntegrator::launch(const Launch& launch) {
 
 double OpenClIntegrator::launchWave(const Launch& launch) {
     const double start = now();
+    plugin::LaunchWatch watch(host_, pacer_.done());
     wavefront_->launch(programs_, launch,
-                       {scene_.get(), sums_.get(), counts_.get(), primitives_.get(), rays_.get()});
+                       {scene_.get(), sums_.get(), counts_.get(), primitives_.get(), rays_.get()},
+                       [&watch] { watch.look(); });
     return now() - start;
 }
 

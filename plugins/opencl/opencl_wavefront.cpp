@@ -1,5 +1,6 @@
 #include "opencl_wavefront.h"
 
+#include "backend/sdk/gpu_schedule.h"
 #include "common/film_slices.h"
 
 #include <algorithm>
@@ -30,11 +31,11 @@ void setArgument(const Program& program, cl_uint index, const T& value) {
 
 }  // namespace
 
-bool takesWaves(const Device& device) {
+bool takesWaves(const Device& device, std::uint32_t max_depth) {
     // Pointers of 8 bytes, as the host's CrtWave has them.
     if (device.address_bits != 64) return false;
     const char* asked = std::getenv("CRT_OPENCL_WAVES");
-    return !device.is_cpu || (asked != nullptr && std::string(asked) == "1");
+    return !device.is_cpu || mayOutlastLaunch(max_depth) || (asked != nullptr && std::string(asked) == "1");
 }
 
 Wavefront::Wavefront(const Device& device, const Session& session, const void* blob,
@@ -60,7 +61,8 @@ void Wavefront::run(const Program& program, std::uint64_t groups) const {
           std::string("launching ") + plugin::entryName(program.spec.entry));
 }
 
-void Wavefront::runWave(const std::vector<Program>& kernels, const kernel::CrtWave& wave) const {
+void Wavefront::runWave(const std::vector<Program>& kernels, const kernel::CrtWave& wave,
+                        const std::function<void()>& meanwhile) const {
     const cl_command_queue queue = session_.queue.get();
     const std::uint64_t words = CRT_WAVE_WORDS(std::uint64_t{wave.slots}, plan_.queues());
     const std::uint64_t lengths = CRT_WAVE_WORDS(0, plan_.queues());  // and the number of those done, last
@@ -93,12 +95,13 @@ void Wavefront::runWave(const std::vector<Program>& kernels, const kernel::CrtWa
             check(clEnqueueReadBuffer(queue, words_.get(), CL_TRUE, (words - 1) * sizeof done, sizeof done,
                                       &done, 0, nullptr, nullptr),
                   "rendering on '" + device_.name + "'");
+            if (done < wave.slots) meanwhile();
             return done;
         });
 }
 
 void Wavefront::launch(const std::vector<Program>& kernels, const Launch& launch,
-                       const WaveTarget& target) const {
+                       const WaveTarget& target, const std::function<void()>& meanwhile) const {
     for (const Program& program : kernels) {
         setArgument(program, 0, target.scene);
         setArgument(program, 1, header_.get());
@@ -113,7 +116,7 @@ void Wavefront::launch(const std::vector<Program>& kernels, const Launch& launch
     plugin::inBands(launch, slots_, slotsAcross(launch.x1 - launch.x0), [&](const Launch& part) {
         kernel::CrtWave wave = plugin::waveOf(plan_, part, 1);
         kernel::crt_wave_lay_out(&wave, plan_.queues(), nullptr, nullptr);
-        runWave(kernels, wave);
+        runWave(kernels, wave, meanwhile);
     });
 }
 

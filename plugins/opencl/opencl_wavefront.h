@@ -15,8 +15,9 @@ namespace crt::opencl {
 
 /// Whether scenes of many materials are rendered in waves there: on GPUs. On a processor the lanes do not
 /// wait for each other, and waves cost a fifth to a third (docs/decisions/0044-waves-for-opencl.md); with
-/// CRT_OPENCL_WAVES=1 in the environment it takes them too, so that tests and measurements can.
-bool takesWaves(const Device& device);
+/// CRT_OPENCL_WAVES=1 in the environment it takes them too, so that tests and measurements can. Everywhere,
+/// where a path may outlast a launch (backend/sdk/gpu_schedule.h).
+bool takesWaves(const Device& device, std::uint32_t max_depth);
 
 /// What a wave reads and what it adds to, on the device.
 struct WaveTarget {
@@ -35,11 +36,14 @@ public:
 
     const plugin::WavePlan& plan() const { return plan_; }
 
-    /// Takes all samples of a launch. `kernels`: those of plan(). Waits for the end.
-    void launch(const std::vector<Program>& kernels, const Launch& launch, const WaveTarget& target) const;
+    /// Takes all samples of a launch. `kernels`: those of plan(). Waits for the end, and calls `meanwhile`
+    /// between passes, which may throw.
+    void launch(const std::vector<Program>& kernels, const Launch& launch, const WaveTarget& target,
+                const std::function<void()>& meanwhile) const;
 
 private:
-    void runWave(const std::vector<Program>& kernels, const kernel::CrtWave& wave) const;
+    void runWave(const std::vector<Program>& kernels, const kernel::CrtWave& wave,
+                 const std::function<void()>& meanwhile) const;
     void run(const Program& program, std::uint64_t groups) const;
 
     const Device& device_;

@@ -48,7 +48,8 @@ def compare(a, b, *, tolerance=0.0, all_channels=False):
     with tempfile.TemporaryDirectory(prefix="crt-compare-") as folder:
         files = [image_file(image, pathlib.Path(folder, name)) for image, name in ((a, "a"), (b, "b"))]
         channels = ["--all-channels"] if all_channels else []
-        code, printed = program.run(["compare", *files, "--tolerance", tolerance, *channels, "--json"],
+        names = map(program.file_argument, files)
+        code, printed = program.run(["compare", *names, "--tolerance", tolerance, *channels, "--json"],
                                     answers=(0, DIFFER))
     return Judgement(code == 0, json.loads(printed))
 
@@ -102,8 +103,8 @@ def converge(scenes, output, *, backends=None, vary=None, references=(), time_li
         settings = {tuple(scene[1:]) for scene in shown}
         if len(settings) != 1:
             raise Error("the scenes of one run must have the same values set", Kind.USAGE)
-        code, _ = program.run([*arguments, *(scene[0] for scene in shown), *settings.pop()],
-                              answers=(0, DIFFER))
+        names = [program.file_argument(scene[0]) for scene in shown]
+        code, _ = program.run([*arguments, *names, *settings.pop()], answers=(0, DIFFER))
     folder = pathlib.Path(output)
     return Judgement(code == 0, json.loads((folder / "manifest.json").read_text("utf-8")), folder)
 

@@ -23,6 +23,12 @@ def path():
     raise Error(f"the program crt is not where it should be: {place}", Kind.USAGE)
 
 
+def file_argument(path):
+    """The name of a file as an argument: one that begins with "-" would be an option."""
+    name = os.fspath(path)
+    return f"./{name}" if name.startswith("-") else name
+
+
 def run(arguments, *, answers=(0,)):
     """Runs `crt ARGUMENTS` and returns its exit code and what it printed. Codes beside `answers` raise
     crt.Error with the program's own sentences. What it says meanwhile goes to the logger `crt`. Ctrl-C ends

@@ -166,7 +166,7 @@ def require_same(folder, spec):
 
 def write(path, text, executable=False):
     temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    temporary.write_text(text, "utf-8")
+    temporary.write_bytes(text.encode("utf-8", "surrogateescape"))  # Names of files may be no UTF-8.
     if executable:
         temporary.chmod(temporary.stat().st_mode | 0o111)
     os.replace(temporary, path)

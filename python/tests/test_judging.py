@@ -27,6 +27,12 @@ def test_other_samples_are_another_image(box, tmp_path):
     assert crt.compare(a, b, tolerance=10)
 
 
+def test_names_that_look_like_options_are_names(box, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    crt.render(box, spp=1).save("--help.exr")
+    assert crt.compare("--help.exr", "--help.exr")
+
+
 def test_what_is_no_image_is_an_error(tmp_path):
     (tmp_path / "a.exr").write_text("no image")
     with pytest.raises(crt.Error) as raised:

@@ -128,6 +128,16 @@ def test_bad_requests(folder, arguments, code, words):
     assert not list(folder.glob("*.slurm"))
 
 
+def test_a_scene_whose_name_is_no_utf_8(folder):
+    name = os.fsdecode(b"caf\xe9.yaml")
+    shutil.copy("my box.yaml", name)
+    done = subprocess.run([sys.executable, "-m", "crt", "slurm", name, "--spp", "4", "--nodes", "2"],
+                          capture_output=True, timeout=60)
+    assert done.returncode == 0, done.stderr
+    (script,) = folder.glob("caf*.slurm/render.sbatch")
+    assert b"caf\xe9.yaml" in script.read_bytes()
+
+
 def test_folder_of_another_render_is_refused(folder):
     assert command("my box.yaml", "--spp", 64, "--nodes", 2, "-b", "embree").returncode == 0
     assert command("my box.yaml", "--spp", 64, "--nodes", 4, "-b", "embree").returncode == 0

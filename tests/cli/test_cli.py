@@ -7,6 +7,8 @@
 import json
 import os
 import re
+import shutil
+import subprocess
 
 import harness
 from harness import CliTest, SCENE
@@ -259,6 +261,40 @@ class Verify(CliTest):
             first, program, folder = file.read().split()
         self.assertEqual((first, folder), ("-B", os.path.realpath(self.path("out"))))
         self.assertTrue(os.path.exists(os.path.join(program, "__main__.py")))
+
+    def test_a_program_of_pages_that_others_could_have_written_is_not_run(self):
+        """In a copy of the tree, which its tests may change."""
+        tree = os.path.dirname(os.path.dirname(os.path.realpath(harness.CRT)))
+        os.makedirs(self.path("tree/bin"))
+        shutil.copy(os.path.join(tree, "bin", "crt"), self.path("tree/bin/crt"))
+        report = self.path("tree/share/crt/report")
+        shutil.copytree(os.path.join(tree, "share", "crt", "report"), report)
+        for folder, _, files in os.walk(self.path("tree")):
+            for name in [".", *files]:
+                path = os.path.join(folder, name)
+                os.chmod(path, os.stat(path).st_mode & ~0o022)
+        self.write("python", "#!/bin/sh\ntouch ran\necho page > \"$3/verify.html\"\n")
+        os.chmod(self.path("python"), 0o755)
+
+        def verify():
+            arguments = ["verify", "-b", "example", "--case", "furnace", "-o", "out"]
+            return subprocess.run(
+                [self.path("tree/bin/crt"), *arguments],
+                cwd=self.directory,
+                env=harness.environment(CRT_PYTHON=self.path("python")),
+                capture_output=True,
+                text=True,
+            )
+        for path in (report, os.path.join(report, "__main__.py")):
+            mode = os.stat(path).st_mode
+            os.chmod(path, mode | 0o022)
+            run = verify()
+            self.assertEqual(run.returncode, 0, run.stderr)
+            self.assertIn("is refused: everyone can write to", run.stdout)
+            self.assertFalse(os.path.exists(self.path("ran")))
+            os.chmod(path, mode)
+        verify()
+        self.assertTrue(os.path.exists(self.path("ran")))
 
     def test_without_a_page_its_command_is_said_and_the_answer_is_the_same(self):
         for python, why in (("/nowhere/python", "cannot start '/nowhere/python': No such file or directory"),

@@ -179,6 +179,13 @@ class Plugins(CliTest):
         self.assertFalse(fake["usable"])
         self.assertEqual(fake["devices"], [])
 
+    def test_no_library_is_looked_for_in_the_current_folder(self):
+        """A folder with a scene from elsewhere may hold one of that name."""
+        run = self.crt("plugins", LD_DEBUG="libs", LC_ALL="C")
+        tried = re.findall("trying file=(.*)", run.stderr)
+        self.assertTrue(tried)
+        self.assertEqual([name for name in tried if not name.startswith("/")], [])
+
 
 class Warm(CliTest):
     def test_says_of_each_scene_what_its_kernel_took(self):

@@ -20,6 +20,16 @@ WITH_AOVS = (
 )
 
 
+# Each path goes on until its depth is reached, in an hour.
+MIRRORS = """crt: 1
+camera: {position: [0, 0, 0], target: [0, 0, 1]}
+film: {resolution: [16, 16]}
+integrator: {max_depth: 1000000000, roulette: false}
+materials: {m: {type: mirror, reflectance: 1}}
+objects: [{sphere: {radius: 1, inward: true}, material: m}]
+lights: [{type: point, position: [0, 0.1, 0], power_w: 1}]
+"""
+
 # A film of format 2, which held no record.
 OLD_FILM = """
 89435254460d0a1a0200000078000000c000000000000000a07c53a2d2fe44e401000000010000000400000000000000
@@ -84,6 +94,52 @@ class StoppingAndGoingOn(CliTest):
         self.assertEqual(process.returncode, 130)
         # At the end of the chunk it would have written the samples so far.
         self.assertFalse(os.path.exists(self.path("part.pfm")))
+
+    def endless(self, *arguments):
+        return ["scene.yaml", "-b", "fake", "--chunk", "1", "-o", "part.pfm", *arguments]
+
+    def assert_samples_before_are_kept(self, reason):
+        report = self.report("part.report.json")
+        self.assertEqual(report["stop"]["reason"], reason)
+        self.assertEqual(report["samples"]["per_pixel"], 4)
+        self.crt("scene.yaml", "-b", "fake", "--spp", "4", "-o", "whole.pfm")
+        self.assertEqual(read_bytes(self.path("part.pfm")), read_bytes(self.path("whole.pfm")))
+
+    def test_after_its_time_a_path_without_end_is_given_up(self):
+        run = self.crt(*self.endless("--time", "1s"), fault="endless")
+        self.assertIn("the samples that were being taken are left out", run.stderr)
+        self.assert_samples_before_are_kept("time")
+
+    def test_after_ctrl_c_a_path_without_end_is_given_up(self):
+        process = self.start(*self.endless(), fault="endless")
+        self.wait_for_rendering(process)
+        process.send_signal(signal.SIGINT)
+        _, messages = process.communicate(timeout=60)
+        self.assertEqual(process.returncode, 130, messages)
+        self.assertIn("--resume", messages)
+        self.assert_samples_before_are_kept("interrupted")
+
+    def test_without_any_sample_there_is_no_image_and_a_reason(self):
+        run = self.crt(*self.endless("--samples", "8:16", "--time", "1s"), fault="endless", expect=2)
+        self.assert_one_error(run, "not all pixels have a sample", "integrator.max_depth")
+        process = self.start(*self.endless("--samples", "8:16"), fault="endless")
+        self.wait_for_rendering(process)
+        process.send_signal(signal.SIGINT)
+        _, messages = process.communicate(timeout=60)
+        self.assertEqual(process.returncode, 130, messages)
+        self.assertIn("before all pixels had a sample: there is no image", messages)
+        self.assertFalse(os.path.exists(self.path("part.pfm")))
+
+    def test_real_backends_end_within_a_path_without_end(self):
+        """The GPU's kernels are asked by tests/cuda_on_host and tests of conformance alone."""
+        self.write("mirrors.yaml", MIRRORS)
+        backends = [name for name in ("embree", "opencl") if name in harness.real_backends()]
+        for backend in backends:
+            arguments = ["mirrors.yaml", "-b", backend, "-t", "1", "--time", "1s", "-o", "a.pfm"]
+            run = self.crt(*arguments, expect=2, CRT_BACKEND_PATH="")
+            self.assert_one_error(run, "not all pixels have a sample")
+        if not backends:
+            self.skipTest("there is neither embree nor opencl")
 
     def test_resume_raises_the_target(self):
         self.crt("scene.yaml", "-b", "fake", "--spp", "40", "-o", "whole.pfm")

@@ -30,6 +30,16 @@ class Waves(CliTest):
             compared = self.crt("compare", "--all-channels", "paths.exr", "waves.exr").stdout
             self.assertIn("same bits", compared)
 
+    def test_kernel_texts_of_others_are_refused_with_their_code(self):
+        if "opencl" not in harness.real_backends():
+            self.skipTest("opencl has no device")
+        os.mkdir(self.path("kernels"))
+        os.chmod(self.path("kernels"), 0o777)
+        self.write("kernels/wavefront.h", "")
+        run = self.crt("scene.yaml", "-b", "opencl", "-o", "a.pfm", "-q", "--no-cache", expect=4,
+                       CRT_BACKEND_PATH="", CRT_KERNEL_DIR=self.path("kernels"))
+        self.assert_one_error(run, "the kernels of CRT_KERNEL_DIR are refused: everyone can write to")
+
 
 if __name__ == "__main__":
     harness.main(__doc__)

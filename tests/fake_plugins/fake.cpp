@@ -7,6 +7,7 @@
 //   nan     every seventh sample is not a number
 //   slow    2 ms a row, with a look at cancel after each
 //   hang    never comes back
+//   endless from sample 4 on a path without end, which looks at cancel
 //   talk    a thread of the plugin warns
 //   nan_film, count_film   the film that is handed over holds a NaN, or more samples than were asked for
 //   scene_oom, read   set_scene or read_film fails
@@ -89,6 +90,10 @@ public:
             if (half_way && fault == "device")
                 throw PluginError(CRT_DEVICE_FAILED, "the device fell off the bus");
             if (fault == "slow") std::this_thread::sleep_for(std::chrono::milliseconds(2));
+            if (fault == "endless" && half_way && range.first_sample + range.sample_count > 4) {
+                while (!host_.cancelled(done)) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+                return false;
+            }
             if (host_.cancelled(done)) return false;
             for (std::uint32_t x = range.x0; x < range.x1; ++x)
                 renderPixel(range, seed, x, y, fault == "nan");

@@ -17,6 +17,7 @@
 #include <cstring>
 #include <exception>
 #include <filesystem>
+#include <stdexcept>
 #include <system_error>
 #include <utility>
 
@@ -96,6 +97,12 @@ std::string temporaryPath(const std::string& entry) {
 }  // namespace
 
 std::string whyNotFolder(const std::string& folder) { return trust::whyNotFolder(folder); }
+
+std::string trustedProgram(const std::string& name) {
+    const trust::Judged judged = trust::judge(name);
+    if (!judged.why.empty()) throw std::runtime_error("'" + name + "' is refused: " + judged.why);
+    return judged.path;
+}
 
 KernelCache::KernelCache(const char* directory, std::uint64_t max_bytes)
     : directory_(directory != nullptr ? directory : ""), max_bytes_(max_bytes) {}

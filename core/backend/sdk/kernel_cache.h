@@ -20,6 +20,10 @@ namespace crt::plugin {
 /// that this process runs. For caches that libraries manage themselves. [any thread]
 std::string whyNotFolder(const std::string& folder);
 
+/// The program that a name leads to, to be started in its place. Throws std::runtime_error with a sentence
+/// if another user could have written it. [any thread]
+std::string trustedProgram(const std::string& name);
+
 class KernelCache {
 public:
     using Key = std::array<unsigned char, 16>;

@@ -65,8 +65,15 @@ public:
     }
     const Bounds& bounds() const { return nodes_[0].bounds; }
 
+    /// Whether the rays took more steps than they may, as where all triangles lie on one spot. Further ones
+    /// find nothing.
+    bool isExhausted() const { return steps_ > kMostSteps; }
+
 private:
     static constexpr std::size_t kLeaf = 4;
+    /// Nodes visited and triangles tested by all rays: a thousand for each, three times what large buildings
+    /// take.
+    static constexpr std::uint64_t kMostSteps = 300'000'000;
 
     struct Node {
         Bounds bounds;
@@ -83,6 +90,7 @@ private:
     const std::vector<PaintedTriangle>& triangles_;
     std::vector<std::uint32_t> order_;
     std::vector<Node> nodes_;
+    mutable std::uint64_t steps_ = 0;
 };
 
 std::size_t Tree::build(std::size_t begin, std::size_t end) {
@@ -129,6 +137,8 @@ double Tree::entry(const Bounds& bounds, const Vec3d& origin, const Vec3d& inver
 void Tree::visit(std::size_t number, const Vec3d& origin, const Vec3d& direction, const Vec3d& inverse,
                  Hit& hit) const {
     const Node& node = nodes_[number];
+    steps_ += 1 + (node.second == 0 ? node.end - node.begin : 0);
+    if (isExhausted()) return;
     if (node.second == 0) {
         for (std::size_t i = node.begin; i < node.end; ++i)
             testTriangle(triangles_[order_[i]], origin, direction, hit);
@@ -281,7 +291,7 @@ std::optional<InnerView> innerView(const std::vector<PaintedTriangle>& triangles
             best =
                 std::max(best, viewFrom(tree, place.position, {std::sin(turn), 0, -std::cos(turn)}, aspect));
         }
-    return best.materials > 0 ? std::optional(best.view) : std::nullopt;
+    return best.materials > 0 && !tree.isExhausted() ? std::optional(best.view) : std::nullopt;
 }
 
 }  // namespace crt

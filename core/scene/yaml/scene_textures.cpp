@@ -209,9 +209,11 @@ void TextureReader::requireRoom(const TextureImage& image, const ImageSource& so
     const std::uintmax_t size =
         source.bytes ? source.bytes->size() : std::filesystem::file_size(source.name, unknown);
     bytes_ += 2 * image.words();
+    // One image at a time is decoded, which takes more than what stays of it.
+    largest_decoding_ = std::max<std::uint64_t>(largest_decoding_, 3 * image.words());
     file_bytes_ += unknown ? 0 : size;
-    const std::string why =
-        ExpansionLimit(scene_.input_bytes + file_bytes_).refusal(bytes_, "bytes of texels", 1);
+    const ExpansionLimit limit(scene_.input_bytes + file_bytes_);
+    const std::string why = limit.refusal(bytes_ + largest_decoding_, "bytes of texels", 1);
     if (!why.empty()) throw Error(ErrorKind::Scene, why);
 }
 

@@ -59,7 +59,7 @@ private:
     std::map<std::pair<const YamlNode*, TexelKind>, std::optional<TextureIndex>>
         written_;  ///< By node: what an alias repeats is read once.
     std::map<const TextureImage*, std::uint64_t> bytes_of_;
-    std::uint64_t bytes_ = 0, file_bytes_ = 0;
+    std::uint64_t bytes_ = 0, largest_decoding_ = 0, file_bytes_ = 0;
 };
 
 }  // namespace crt

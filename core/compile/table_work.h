@@ -1,0 +1,34 @@
+/// What the tables of materials cost, counted before any of them is made, and the most that a scene may ask
+/// for: a few characters of a file each stand for half a second of a processor.
+#pragma once
+
+#include "scene/scene.h"
+
+#include <cstddef>
+
+namespace crt {
+
+class TableWork {
+public:
+    /// One more table, of so many steps: directions of microfacets, most often.
+    void add(double steps, const Material& material);
+
+    /// Throws crt::Error(Scene) where the tables would take longer than kMostTableSeconds, or than the
+    /// environment variable CRT_TABLE_SECONDS allows; crt::Error(Usage) when that is no number.
+    void requireBounded() const;
+
+    double seconds() const { return steps_ * kSecondsPerStep; }
+
+private:
+    /// Measured on one core of a server of 2020.
+    static constexpr double kSecondsPerStep = 1.5e-8;
+
+    double steps_ = 0;
+    std::size_t tables_ = 0;
+    const Material* last_ = nullptr;  ///< Of the first that is too many; of the last one otherwise.
+};
+
+/// Of one processor. Scenes of hundreds of materials stay far below it.
+inline constexpr double kMostTableSeconds = 6;
+
+}  // namespace crt

@@ -1,0 +1,145 @@
+// The tables that are made of materials before rendering: each once, the same in any company, and not more
+// than a scene may ask for.
+#include "catch.h"
+#include "compile/compile.h"
+#include "compile/compensation.h"
+#include "compile/coat.h"
+#include "compile/materials.h"
+#include "scene/yaml/scene_yaml.h"
+
+#include <fmt/format.h>
+
+#include <cstdlib>
+#include <ctime>
+
+using namespace crt;
+
+namespace {
+
+Material rough(MaterialType type, double eta, double roughness) {
+    Material m;
+    m.type = type;
+    m.eta = constantSpectrum(eta);
+    m.k = constantSpectrum(type == MaterialType::RoughConductor ? 3 : 0);
+    m.roughness = roughness;
+    return m;
+}
+
+/// One of each kind of table.
+std::vector<Material> oneOfEach() {
+    std::vector<Material> all{
+        rough(MaterialType::RoughConductor, 0.2, 0.4), rough(MaterialType::RoughDielectric, 1.5, 0.4),
+        rough(MaterialType::RoughDielectric, 1.5, 0.3), rough(MaterialType::Plastic, 1.5, 0.3),
+        rough(MaterialType::Plastic, 1.5, 0),          rough(MaterialType::RoughDielectric, 1.5, 0.5)};
+    all[2].eta[100] = 1.51;
+    all[3].diffuse_roughness = 0.5;
+    all[5].film_thickness_nm = 100;
+    all[5].film_index = constantSpectrum(1.3);
+    Material clear = rough(MaterialType::Plastic, 1.5, 0.25);
+    clear.clearcoat.emplace();
+    clear.clearcoat->ior = 1.6;
+    clear.clearcoat->roughness = 0.2;
+    all.push_back(clear);
+    return all;
+}
+
+std::vector<const Material*> addressesOf(const std::vector<Material>& materials) {
+    std::vector<const Material*> all;
+    for (const Material& m : materials) all.push_back(&m);
+    return all;
+}
+
+double secondsFor(const std::vector<const Material*>& materials) {
+    TableWork work;
+    countCoats(materials, work);
+    countRoughBases(materials, work);
+    countCompensations(materials, work);
+    return work.seconds();
+}
+
+/// Spheres of `count` materials, each by its number.
+template <class Text>
+std::string sceneOf(int count, const Text& material) {
+    std::string text = "crt: 1\nfilm: {resolution: [8, 8]}\nenvironment: {radiance: 1}\nmaterials:\n";
+    for (int i = 0; i < count; ++i) text += fmt::format("  m{}: {}\n", i, material(i));
+    text += "objects:\n";
+    for (int i = 0; i < count; ++i) text += fmt::format("- {{sphere: {{radius: 1}}, material: m{}}}\n", i);
+    return text;
+}
+
+std::string refusal(const std::string& text) {
+    try {
+        compileScene(parseScene(text, "s.yaml", "."), 0);
+    } catch (const Error& error) {
+        return error.what();
+    }
+    return {};
+}
+
+}  // namespace
+
+TEST_CASE("tables of equal materials cost once, and all of them something", "[compile][materials]") {
+    const std::vector<Material> materials = oneOfEach();
+    double sum = 0;
+    for (const Material& m : materials) {
+        const double alone = secondsFor({&m});
+        CHECK(alone > 0);
+        const Material same = m;
+        CHECK(secondsFor({&m, nullptr, &same}) == alone);
+        sum += alone;
+    }
+    CHECK(secondsFor(addressesOf(materials)) == Approx(sum));
+}
+
+TEST_CASE("a table does not depend on what else is made", "[compile][materials]") {
+    const std::vector<Material> materials = oneOfEach();
+    std::vector<const Material*> twice = addressesOf(materials);
+    const std::vector<Material> copies = materials;
+    for (const Material& m : copies) twice.push_back(&m);
+    const MaterialTables together = materialTablesOf(twice);
+    for (const Material* m : twice) {
+        const MaterialTables alone = materialTablesOf({m});
+        CAPTURE(static_cast<int>(m->type), m->roughness);
+        const Compensations &own = alone.compensations, &all = together.compensations;
+        if (const auto found = own.table_of.find(m); found != own.table_of.end())
+            CHECK(own.tables.at(found->second).rows == all.tables.at(all.table_of.at(m)).rows);
+        for (const auto& [of, mean] : own.mean_reflectance) CHECK(all.mean_reflectance.at(of) == mean);
+        for (const auto& [key, coat] : alone.coats) {
+            CHECK(together.coats.at(key).albedo == coat.albedo);
+            CHECK(together.coats.at(key).internal_reflectance == coat.internal_reflectance);
+        }
+        for (const auto& [of, base] : alone.rough_bases)
+            CHECK(together.rough_bases.at(of).loss == base.loss);
+    }
+    // All of one kind share a table, those behind a film have one each.
+    CHECK(together.compensations.tables.size() == 5);
+}
+
+TEST_CASE("tables that take too long are refused with the place and what allows them",
+          "[compile][materials][limits]") {
+    const auto glass = [](int i) {
+        return fmt::format("{{type: rough_dielectric, ior: {:.6f}, roughness: {:.6f}}}", 1.1 + i * 1e-5,
+                           0.1 + i * 2e-5);
+    };
+    const auto kinds = {std::string("rough_dielectric, ior: 1.5, roughness: {0}, roughness_anisotropy: 0.5"),
+                        std::string("plastic, reflectance: 0.5, roughness: {0}"),
+                        std::string("rough_conductor, metal: gold, roughness: {0}")};
+    CHECK_THAT(refusal(sceneOf(10'000, glass)), Contains("s.yaml:") && Contains("10000 rough materials") &&
+                                                    Contains("set CRT_TABLE_SECONDS="));
+    for (const std::string& kind : kinds) {
+        CAPTURE(kind);
+        const auto one = [&](int i) {
+            return "{type: " + fmt::format(fmt::runtime(kind), 0.1 + i * 1e-4) + "}";
+        };
+        CHECK_THAT(refusal(sceneOf(4000, one)), Contains("set CRT_TABLE_SECONDS="));
+        CHECK(refusal(sceneOf(4, one)).empty());
+        CHECK(refusal(sceneOf(4000, [&](int) { return one(0); })).empty());
+    }
+
+    ::setenv("CRT_TABLE_SECONDS", "0.0001", 1);
+    CHECK_THAT(refusal(sceneOf(1, glass)), Contains("s.yaml:5:"));
+    ::setenv("CRT_TABLE_SECONDS", "soon", 1);
+    CHECK_THAT(refusal(sceneOf(1, glass)), Contains("CRT_TABLE_SECONDS is 'soon'"));
+    ::unsetenv("CRT_TABLE_SECONDS");
+    CHECK(refusal(sceneOf(1, glass)).empty());
+}
