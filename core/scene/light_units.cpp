@@ -15,8 +15,10 @@ double oneMinusCos(double degrees) {
     return 2 * sine * sine;
 }
 
+double luminanceOfOne_cd_m2() { return kLuminousEfficacy_lm_W * cieYIntegral(); }
+
 double photometric(const Spectrum& spectral) {
-    return kLuminousEfficacy_lm_W * cieYIntegral() * spectrumToXyz(spectral)[1];
+    return luminanceOfOne_cd_m2() * spectrumToXyz(spectral)[1];
 }
 
 double integralOverWavelengths(const Spectrum& spectral) {

@@ -9,6 +9,9 @@ namespace crt {
 /// the tabulated ȳ(λ) (CIE 15:2018, 7.1).
 inline constexpr double kLuminousEfficacy_lm_W = 683.002;
 
+/// Luminance of radiance whose Y is 1, as white pixels of images have it: 72,983 cd/m².
+double luminanceOfOne_cd_m2();
+
 /// Photometric value of a spectral quantity: lumens of W·nm⁻¹, lux of W·m⁻²·nm⁻¹.
 double photometric(const Spectrum& spectral);
 

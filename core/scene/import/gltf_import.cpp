@@ -44,7 +44,7 @@ public:
           losses_(losses),
           graph_(readGltfGraph(file, losses)),
           textures_(file, file_name_, std::move(folder), losses),
-          nit_(graph_.lights.empty() ? 1 : 1 / (kLuminousEfficacy_lm_W * cieYIntegral())),
+          nit_(graph_.lights.empty() ? 1 : 1 / luminanceOfOne_cd_m2()),
           materials_(file, textures_, nit_, losses) {}
 
     std::string text() {

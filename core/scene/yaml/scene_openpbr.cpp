@@ -355,8 +355,7 @@ void ObjectReader::makeRoughDiffuse(Material& material) {
 /// The luminance is that of a colour of luminance 1, as white is.
 std::int32_t ObjectReader::OpenPbr::emission() const {
     if (!(emission_luminance > 0) || !(emission_color.max() > 0)) return -1;
-    const double unit_cd_m2 = kLuminousEfficacy_lm_W * cieYIntegral();
-    const double factor = emission_luminance / unit_cd_m2;
+    const double factor = emission_luminance / luminanceOfOne_cd_m2();
     reader.scene_.emissions.push_back({scaled(emission_color, factor), false});
     return static_cast<std::int32_t>(reader.scene_.emissions.size()) - 1;
 }
