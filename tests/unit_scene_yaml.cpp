@@ -45,7 +45,7 @@ TEST_CASE("writing every default of the schema out changes nothing", "[scene_yam
     }
     for (const KeySchema& key : schemaSection("").keys)
         if (!key.fallback.empty()) text += key.name + ": " + key.fallback + "\n", ++written;
-    CHECK(written == 29);
+    CHECK(written == 30);
 
     const Scene a = parse(""), b = parse(text);
     CHECK(a.camera.position == b.camera.position);

@@ -11,6 +11,7 @@
 
 #include <dlfcn.h>
 #include <elf.h>
+#include <fmt/ranges.h>
 #include <link.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -97,7 +98,8 @@ std::optional<std::string> findPlugin(const std::string& name) {
     const bool known =
         std::find(std::begin(kKnownBackends), std::end(kKnownBackends), name) != std::end(kKnownBackends);
     candidates.insert(std::begin(kKnownBackends), std::end(kKnownBackends));
-    const std::string hint = known ? "" : didYouMean(name, {candidates.begin(), candidates.end()});
+    std::string hint = known ? "" : didYouMean(name, {candidates.begin(), candidates.end()});
+    if (!known && hint.empty()) hint = fmt::format("backends are {}", fmt::join(candidates, ", "));
     refuse(fmt::format("backend '{}' is {}: no {}{}{} in {}{}", name, known ? "not installed" : "unknown",
                        kFilePrefix, name, kFileSuffix, searched, hint.empty() ? "" : "; " + hint));
 }

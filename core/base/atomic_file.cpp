@@ -123,6 +123,9 @@ AtomicFile::AtomicFile(const std::string& path) : path_(path), final_(path) {
             continue;
         if (error_number == ENOENT && final_ != path_)
             refuse(path_, fmt::format("it is a link to '{}', whose directory does not exist", final_));
+        // Such as /proc, where the kernel makes the files.
+        if (error_number == ENOENT && fs::is_directory(directoryOf(final_), ignored))
+            refuse(path_, fmt::format("the folder '{}' takes no files", directoryOf(final_)));
         if (error_number == ENOENT)
             refuse(path_, fmt::format("the directory '{}' does not exist", directoryOf(final_)));
         fail("cannot write", error_number);

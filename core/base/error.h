@@ -15,6 +15,16 @@ struct SourcePlace {
     std::string file;
     int line = 0;
     int column = 0;
+
+    /// "scene.yaml:3:5", as far as it is known: what begins a message.
+    std::string text() const {
+        std::string place = file;
+        for (const int number : {line, column}) {
+            if (number <= 0) break;
+            place += ':' + std::to_string(number);
+        }
+        return place;
+    }
 };
 
 /// What kind of failure this is. The values are the program's exit codes (docs/architecture.md, "Exit

@@ -4,6 +4,8 @@
 #include "base/standard_output.h"
 #include "base/words.h"
 #include "cli/arguments.h"
+#include "cli/python.h"
+#include "scene/import/import.h"
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -11,7 +13,9 @@
 
 #include <algorithm>
 #include <deque>
+#include <filesystem>
 #include <memory>
+#include <system_error>
 #include <utility>
 
 namespace crt {
@@ -73,7 +77,9 @@ public:
                    app->get_footer();
         }
         return make_description(app) + "\n" + make_usage(app, name) + make_subcommands(app, mode) +
-               options(render_, mode) + app->get_footer();
+               options(render_, mode) +
+               fmt::format("\n  {:<26}print the version, as 'crt version' does\n", "--version") +
+               app->get_footer();
     }
 
 private:
@@ -100,7 +106,7 @@ CLI::Validator oneOf(std::vector<std::string> choices) {
 class Parser {
 public:
     explicit Parser(const std::vector<Command>& commands) : app_(kSummary) {
-        app_.set_version_flag("--version", "crt " CRT_VERSION);
+        app_.set_version_flag("--version", versionText());
         app_.require_subcommand(1);
         for (const Command& command : commands) addCommand(command);
         app_.footer(std::string(kExamples) +
@@ -230,6 +236,19 @@ private:
     const Command* chosen_ = nullptr;
 };
 
+bool takesScenes(const Command& command) {
+    return std::any_of(command.arguments.begin(), command.arguments.end(), [](const Argument& argument) {
+        const std::vector<std::string>& ends = argument.completion.words;
+        return std::find(ends.begin(), ends.end(), "yaml") != ends.end();
+    });
+}
+
+/// A scene that the Python package imports.
+bool isForeignScene(const std::string& word) {
+    std::error_code unknown;
+    return !otherRendererOf(word).empty() && std::filesystem::is_regular_file(word, unknown);
+}
+
 std::vector<std::string> namesOf(const std::vector<Command>& commands) {
     std::vector<std::string> names;
     for (const Command& command : commands) names.push_back(command.name);
@@ -238,6 +257,7 @@ std::vector<std::string> namesOf(const std::vector<Command>& commands) {
 
 }  // namespace
 
+std::string versionText() { return "crt " CRT_VERSION; }
 std::string programSummary() { return kSummary; }
 std::string programExamples() { return kExamples; }
 std::string programExitCodes() { return kExitCodes; }
@@ -260,7 +280,10 @@ int CommandLine::run(const std::vector<std::string>& words) const {
         throw Error(ErrorKind::Usage,
                     "there is no scene to render; try 'crt configs/cornell_box.yaml', or 'crt --help'");
     const Command* command = Parser(commands_).parse(arguments);
-    return command != nullptr ? command->run(shellLine(words)) : 0;
+    if (command == nullptr) return 0;
+    if (takesScenes(*command) && std::any_of(arguments.begin(), arguments.end(), isForeignScene))
+        becomePythonPackage(arguments);  // Without it the command says what is missing.
+    return command->run(shellLine(words));
 }
 
 }  // namespace crt

@@ -26,6 +26,8 @@ private:
     std::vector<Command> commands_;
 };
 
+/// "crt 0.1.0".
+std::string versionText();
 /// The description of the program, the examples and the exit codes of `crt --help`.
 std::string programSummary();
 std::string programExamples();

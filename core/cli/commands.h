@@ -22,6 +22,7 @@ Command pluginsCommand();
 Command warmCommand();
 Command dataCommand();
 Command schemaCommand();
+Command versionCommand();
 /// These two describe the others: `all` must outlive them.
 Command helpCommand(const CommandLine& all);
 Command completionCommand(const CommandLine& all);

@@ -34,6 +34,7 @@ struct DevelopArguments {
     std::vector<std::string> outputs;
     std::vector<SceneOverride> changes;  ///< Keys of `film` that no sample depends on; others are refused.
     std::optional<std::array<int, 4>> crop;  ///< Of the whole film; x0, y0, x1, y1, half open.
+    bool expose_automatically = false;       ///< By the film, instead of the scene's exposure.
     std::vector<std::string> aovs;           ///< Of EXR files; empty: those of the scene. "none": none.
 };
 
@@ -188,6 +189,7 @@ int develop(const DevelopArguments& arguments) {
     if (record.window != held)
         film = cropped(film, {record.window[0] - held[0], record.window[1] - held[1],
                               record.window[2] - held[0], record.window[3] - held[1]});
+    if (arguments.expose_automatically) exposeAutomatically(film, record);
 
     for (Output& image : plan.images) {
         if (image.format == OutputFormat::Exr && arguments.aovs.empty()) image.aovs = record.aovs;
@@ -221,6 +223,8 @@ constexpr const char* kDevelopNotes =
             "\nExamples:\n"
             "  crt scene.yaml -o scene.crtfilm                                       render once\n"
             "  crt develop scene.crtfilm -o a.png --set film.exposure_ev=1           one stop brighter\n"
+            "  crt develop scene.crtfilm -o a.png --expose auto                      "
+            "as bright as it should be\n"
             "  crt develop scene.crtfilm -o b.png --set film.white_balance=D50\n"
             "  crt develop scene.crtfilm -o c.exr -o c.png --crop 100,50,300,250\n"
             "  crt develop scene.crtfilm -o d.exr --aovs albedo,normal,error,samples\n"
@@ -252,6 +256,7 @@ Command developCommand() {
                       .help = "change how it is developed, e.g. film.exposure_ev=1; repeatable",
                       .read = [to](const std::string& text) { to->changes.push_back(parseOverride(text)); },
                       .repeatable = true},
+                     exposeOption(to->expose_automatically),
                      {.names = "--crop",
                       .placeholder = "X0,Y0,X1,Y1",
                       .help = "only these pixels of the film, X1 and Y1 excluded",

@@ -49,7 +49,8 @@ int import(const Request& request) {
                                                   importHint(request.model)));
     if (!isModel(request.model))
         throw Error(ErrorKind::Usage,
-                    fmt::format("'{}' is no model: crt imports .glb, .gltf, .obj and .ply", request.model));
+                    fmt::format("'{}' is no model that crt reads: it imports .glb, .gltf, .obj and .ply",
+                                request.model));
     const bool to_file = !request.output.empty() && request.output != "-";
     ImportOptions options;
     options.allow_outside = request.allow_outside;

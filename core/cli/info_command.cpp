@@ -130,7 +130,7 @@ std::string scheduleText(const Scene& scene, const CompiledScene& compiled) {
                : "one kernel takes a path to its end";
 }
 
-void showScene(const SceneRequest& what) {
+void showScene(const SceneRequest& what, bool verbose) {
     std::optional<StageProgress> progress(std::in_place, ProgressMode::Auto);
     const Scene scene = loadScene(what);
     const CompiledScene compiled = compileScene(scene, requestedAovs(scene));
@@ -158,7 +158,10 @@ void showScene(const SceneRequest& what) {
     std::string left_out;
     for (const auto& [thing, why] : compiled.left_out)
         left_out += fmt::format("{}{}: {}", left_out.empty() ? "" : "\n", thing, why);
-    printRow("left out", left_out.empty() ? "nothing" : left_out);
+    printRow("left out", left_out.empty() ? "nothing"
+                         : verbose        ? left_out
+                                          : counted(compiled.left_out.size(), "feature", "features") +
+                                                " of the kernel; --verbose lists them");
     printRow("scene blob", bytesText(static_cast<double>(compiled.size_bytes)));
     printRow("scene hash", compiled.hash);
     printRow("times", fmt::format("{} to read, {} to compile, {} of it for the accelerator",
@@ -230,17 +233,18 @@ void showImage(const std::string& file) {
     printRow("channels", fmt::format("{}", fmt::join(image.channels, ", ")));
     if (!image.integer_channels.empty())
         printRow("integers", fmt::format("{}", fmt::join(image.integer_channels, ", ")));
-    for (const auto& [key, value] : image.metadata) printRow(key.c_str(), value);
+    for (const auto& [key, value] : image.metadata)
+        printRow(key.c_str(), key == kWhiteLuminanceKey ? value + " cd/m² at (1, 1, 1)" : value);
 }
 
 /// What a scene needs, or what a film or an image holds, by the name's extension.
-int showInfo(const SceneRequest& what) {
+int showInfo(const SceneRequest& what, bool verbose) {
     if (std::filesystem::path(what.file).extension() == kCheckpointExtension) {
         showFilm(what.file);
     } else if (formatOfFile(what.file)) {
         showImage(what.file);
     } else {
-        showScene(what);
+        showScene(what, verbose);
     }
     return 0;
 }
@@ -248,18 +252,26 @@ int showInfo(const SceneRequest& what) {
 }  // namespace
 
 Command infoCommand() {
-    const auto request = std::make_shared<SceneRequest>();
+    struct State {
+        SceneRequest request;
+        bool verbose = false;
+    };
+    const auto state = std::make_shared<State>();
     OptionGroup options{"Options"};
-    addSceneChanges(options, *request);
+    addSceneChanges(options, state->request);
+    options.options.push_back({.names = "-v,--verbose",
+                               .placeholder = {},
+                               .help = "list what the kernel leaves out for this scene, and why",
+                               .read = [state](const std::string&) { state->verbose = true; }});
     return {
         .name = "info",
         .summary = "say what a scene needs, or what a .crtfilm or an image holds",
         .arguments = {{.name = "FILE",
                        .help = "scene (- for standard input), film or image",
-                       .read = [request](const std::string& text) { request->file = text; },
+                       .read = [state](const std::string& text) { state->request.file = text; },
                        .completion = completeFile({"yaml", "yml", "crtfilm", "exr", "png", "ppm", "pfm"})}},
         .groups = {std::move(options)},
-        .run = [request](const std::string&) { return showInfo(*request); }};
+        .run = [state](const std::string&) { return showInfo(state->request, state->verbose); }};
 }
 
 }  // namespace crt

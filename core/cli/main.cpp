@@ -38,7 +38,7 @@ int main(int argc, char** argv) {
              {crt::renderCommand, crt::viewCommand, crt::infoCommand, crt::importCommand,
               crt::compareCommand, crt::mergeCommand, crt::developCommand, crt::convergeCommand,
               crt::referenceCommand, crt::verifyCommand, crt::pluginsCommand, crt::warmCommand,
-              crt::dataCommand, crt::schemaCommand})
+              crt::dataCommand, crt::schemaCommand, crt::versionCommand})
             line.add(command());
         line.add(crt::helpCommand(line));
         line.add(crt::completionCommand(line));

@@ -79,6 +79,7 @@ OptionGroup files(Job& job) {
               .read = [&job](const std::string& text) { job.outputs.push_back(text); },
               .completion = completeOutput(),
               .repeatable = true},
+             exposeOption(job.expose_automatically),
              {.names = "--checkpoint",
               .placeholder = "FILE",
               .help = "save the samples at the end and now and then, for --resume; or off",

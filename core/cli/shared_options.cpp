@@ -59,6 +59,15 @@ Option threadsOption(IntegratorOptions& integrator) {
             }};
 }
 
+Option exposeOption(bool& automatically) {
+    return {.names = "--expose",
+            .placeholder = "auto",
+            .help = "choose the exposure by the picture: its log-average becomes 18 % grey",
+            .read = [&automatically](const std::string&) { automatically = true; },
+            .completion = completeWord({"auto"}),
+            .choices = {"auto"}};
+}
+
 Option noProgressOption(ProgressMode& progress) {
     return {.names = "-q,--quiet", .placeholder = {}, .help = "no progress",
             .read = [&progress](const std::string&) { progress = ProgressMode::None; }};
@@ -69,7 +78,9 @@ Option quietOption(const char* help) {
             .read = [](const std::string&) { setLogLevel(LogLevel::Warning); }};
 }
 
-Completion completeScene() { return completeFile({"yaml", "yml", "glb", "gltf", "obj", "ply"}); }
+Completion completeScene() {
+    return completeFile({"yaml", "yml", "glb", "gltf", "obj", "ply", "xml", "pbrt"});
+}
 Completion completeImage() { return completeFile({"exr", "png", "ppm", "pfm"}); }
 Completion completeFilm() { return completeFile({"crtfilm"}); }
 Completion completeOutput() { return completeFile({"exr", "png", "ppm", "pfm", "crtfilm"}); }

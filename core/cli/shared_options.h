@@ -24,6 +24,9 @@ Option backendOption(std::string& backend);
 Option deviceOption(IntegratorOptions& integrator);
 Option threadsOption(IntegratorOptions& integrator);
 
+/// --expose auto.
+Option exposeOption(bool& automatically);
+
 /// -q of commands that print no other messages than progress.
 Option noProgressOption(ProgressMode& progress);
 

@@ -1,6 +1,7 @@
 #include "compile/environment_image.h"
 
 #include "base/error.h"
+#include "base/log.h"
 #include "base/parallel.h"
 #include "compile/distributions.h"
 #include "image/texels.h"
@@ -22,8 +23,7 @@ namespace {
 constexpr double kPi = std::numbers::pi;
 
 [[noreturn]] void refuse(const SourcePlace& place, const std::string& sentence) {
-    throw Error(ErrorKind::Scene,
-                fmt::format("{}:{}:{}: error: {}", place.file, place.line, place.column, sentence), place);
+    throw Error(ErrorKind::Scene, fmt::format("{}: error: {}", place.text(), sentence), place);
 }
 
 /// Solid angle of a texel of a row, per radian of its width: cos at its upper edge less that at its lower
@@ -73,20 +73,36 @@ void checkSize(const EnvironmentImage& image, const TexelsInfo& info) {
     if (!why.empty()) refuse(image.place, fmt::format("'{}': {}", image.file, why));
 }
 
+/// What a reader of the file makes of it; what it refuses is told at the image's place in the scene.
+template <class Read>
+auto readAt(const SourcePlace& place, const Read& read) {
+    try {
+        return read();
+    } catch (const Error& error) {
+        if (error.kind() != ErrorKind::Scene) throw;
+        refuse(place, error.what());
+    }
+}
+
+/// Codes of 8 and 16 bits end at the white of a screen, and the sun is brighter by factors of ten thousands.
+void warnOfCodes(const EnvironmentImage& image, const TexelsInfo& info) {
+    if (info.type == TexelType::Float) return;
+    logWarning("{}: '{}' has {} bits a colour, which end at white: it holds neither the sun nor lamps, and "
+               "shadows will be faint; take an EXR, HDR or PFM file",
+               image.place.text(), image.file, info.type == TexelType::Uint8 ? 8 : 16);
+}
+
 EnvironmentTexels texelsOf(const EnvironmentImage& image) {
     EnvironmentTexels out;
-    std::vector<float> rgb;
-    try {
-        const TexelsInfo info = texelsInfo(image.file);
-        checkShape(image, info);
-        checkSize(image, info);
-        out.width = info.width;
-        out.height = info.height;
-        rgb = linearRgb(readTexels(image.file), TexelColor::Auto, image.file);
-    } catch (const Error& error) {
-        if (error.kind() != ErrorKind::Scene || error.place().line > 0) throw;
-        refuse(image.place, error.what());
-    }
+    const TexelsInfo info = readAt(image.place, [&] { return texelsInfo(image.file); });
+    checkShape(image, info);
+    checkSize(image, info);
+    warnOfCodes(image, info);
+    out.width = info.width;
+    out.height = info.height;
+    const std::vector<float> rgb = readAt(image.place, [&] {
+        return linearRgb(readTexels(image.file), TexelColor::Auto, image.file);
+    });
     if (const std::string wrong = fault(rgb, out.width, image.scale); !wrong.empty())
         refuse(image.place, fmt::format("'{}' {}", image.file, wrong));
     const std::size_t count = std::size_t{out.width} * out.height;

@@ -117,6 +117,8 @@ std::string filterText(const FilmSettings& film) {
     return fmt::format("Blackman-Harris of radius {}", film.filter_radius);
 }
 
+constexpr const char* kIntegratorTrait = "the integrator";
+
 const char* integratorText(IntegratorType type) {
     return type == IntegratorType::Path ? "path" : type == IntegratorType::Normals ? "normals" : "aabb";
 }
@@ -313,7 +315,7 @@ std::vector<SceneTrait> traitsOf(const Scene& scene, std::uint32_t aovs) {
             {"the seed", std::to_string(scene.sampler.seed), {}},
             {"the sampler", samplerText(scene.sampler.type), {}},
             {"the replicates", std::to_string(replicatesOf(scene)), {}},
-            {"the integrator", integratorText(i.type), {}},
+            {kIntegratorTrait, integratorText(i.type), {}},
             {"max_depth", std::to_string(i.max_depth), {}},
             {"roulette", i.roulette ? fmt::format("on from depth {}", i.roulette_depth) : "off", {}},
             {"nee", onOff(i.nee), {}},
@@ -531,6 +533,12 @@ std::vector<std::string> differingTraits(const FilmRecord& found, const FilmReco
                                             plural ? "are others" : "is another", have->text));
     }
     return sentences;
+}
+
+bool FilmRecord::holdsRadiance() const {
+    return std::any_of(traits.begin(), traits.end(), [](const SceneTrait& trait) {
+        return trait.name == kIntegratorTrait && trait.text == integratorText(IntegratorType::Path);
+    });
 }
 
 void FilmRecord::addRun(const FilmRecord& other) {

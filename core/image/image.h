@@ -31,6 +31,8 @@ struct Image {
     /// seen as white where that was not applied.
     std::optional<RowMatrix4d> world_to_camera, world_to_ndc;
     std::optional<std::array<double, 2>> adopted_neutral;
+    /// For EXR: the luminance of the colour (1, 1, 1), of images whose pixels are radiance.
+    std::optional<double> white_luminance_cd_m2;
 };
 
 }  // namespace crt

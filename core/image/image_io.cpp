@@ -2,8 +2,6 @@
 
 #include "base/error.h"
 #include "base/input_file.h"
-#include "base/log.h"
-#include "base/parallel.h"
 #include "image/image_metadata.h"
 #include "image/image_module.h"
 #include "image/open_module.h"
@@ -12,7 +10,6 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <bit>
 #include <cctype>
 #include <cerrno>
@@ -33,32 +30,6 @@ namespace {
 }
 [[noreturn]] void refuseToRead(const std::string& path, const std::string& why) {
     throw Error(ErrorKind::Usage, fmt::format("cannot read the image '{}': {}", path, why), {path});
-}
-
-/// Where R, G and B lie among the float channels: by name, because files and libraries reorder them.
-std::array<std::size_t, 3> colorChannels(const Image& image) {
-    std::array<std::size_t, 3> index{};
-    constexpr const char* kNames[] = {"R", "G", "B"};
-    for (std::size_t c = 0; c < 3; ++c) {
-        const auto found = std::find(image.channels.begin(), image.channels.end(), kNames[c]);
-        if (found == image.channels.end())
-            throw Error(ErrorKind::Output, fmt::format("the image has no channel '{}'", kNames[c]));
-        index[c] = static_cast<std::size_t>(found - image.channels.begin());
-    }
-    return index;
-}
-
-Matrix3d inverse(const Matrix3d& m) {
-    Matrix3d r{};
-    for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j) {
-            const int a = (j + 1) % 3, b = (j + 2) % 3, c = (i + 1) % 3, d = (i + 2) % 3;
-            r[i][j] = m[a][c] * m[b][d] - m[a][d] * m[b][c];
-        }
-    const double determinant = m[0][0] * r[0][0] + m[0][1] * r[1][0] + m[0][2] * r[2][0];
-    for (Vec3d& row : r)
-        for (double& entry : row) entry /= determinant;
-    return r;
 }
 
 // ------------------------------------------------------------------------------------------------- PFM, PPM
@@ -220,15 +191,6 @@ std::array<float, Size> floatsOf(const std::optional<std::array<double, Size>>& 
     return floats;
 }
 
-/// Of R, G and B; at least 0.
-double largestColor(const Image& image) {
-    const std::array<std::size_t, 3> color = colorChannels(image);
-    double largest = 0;
-    for (std::size_t p = 0; p < image.pixels.size(); p += image.channels.size())
-        for (const std::size_t c : color) largest = std::max(largest, double{image.pixels[p + c]});
-    return largest;
-}
-
 using Reason = std::array<char, 512>;
 
 void writeExr(const std::string& path, const Image& image) {
@@ -260,6 +222,7 @@ void writeExr(const std::string& path, const Image& image) {
     planes.world_to_camera = image.world_to_camera ? to_camera.data() : nullptr;
     planes.world_to_ndc = image.world_to_ndc ? to_ndc.data() : nullptr;
     planes.adopted_neutral = image.adopted_neutral ? neutral.data() : nullptr;
+    planes.white_luminance_cd_m2 = static_cast<float>(image.white_luminance_cd_m2.value_or(0));
 
     AtomicFile file(path);
     Reason reason{};
@@ -345,49 +308,6 @@ std::optional<OutputFormat> formatOfFile(const std::string& path) {
     return std::nullopt;
 }
 
-std::optional<Matrix3d> toLinearSrgb(const Image& image) {
-    if (!image.chromaticities) return std::nullopt;
-    const auto is = [&](ColorSpace space) {
-        const std::array<double, 8> known = chromaticities(space);
-        // A file holds them as float.
-        return std::equal(known.begin(), known.end(), image.chromaticities->begin(),
-                          [](double a, double b) { return std::abs(a - b) < 1e-6; });
-    };
-    if (is(ColorSpace::LinearSrgb)) return std::nullopt;
-    for (const ColorSpace space : {ColorSpace::AcesCg, ColorSpace::Xyz})
-        if (is(space)) return multiply(xyzToRgb(ColorSpace::LinearSrgb), inverse(xyzToRgb(space)));
-    throw Error(ErrorKind::Output,
-                "the image's primaries are neither those of sRGB, of "
-                "ACEScg nor of XYZ, so it cannot become 8-bit sRGB");
-}
-
-EncodedImage encodeSrgb8(const Image& image) {
-    const std::array<std::size_t, 3> color = colorChannels(image);
-    const std::optional<Matrix3d> to_srgb = toLinearSrgb(image);
-    const std::size_t pixels = std::size_t{image.width} * image.height;
-    EncodedImage encoded;
-    encoded.rgb.resize(3 * pixels);
-    std::atomic<std::uint64_t> clipped{0};
-    parallelFor(pixels, std::size_t{1} << 14, [&](std::size_t first, std::size_t end) {
-        std::uint64_t clipped_here = 0;
-        for (std::size_t p = first; p < end; ++p) {
-            const float* const pixel = image.pixels.data() + p * image.channels.size();
-            Vec3d rgb{pixel[color[0]], pixel[color[1]], pixel[color[2]]};
-            if (to_srgb) rgb = multiply(*to_srgb, rgb);
-            for (std::size_t c = 0; c < 3; ++c) {
-                const double value = rgb[c] >= 0.0 ? std::min(rgb[c], 1.0) : 0.0;  // NaN is 0.
-                // One rounding of float in the conversion from another space is no clipping worth a warning.
-                if (!(rgb[c] >= -1e-6 && rgb[c] <= 1.0 + 1e-6)) ++clipped_here;
-                encoded.rgb[3 * p + c] =
-                    static_cast<std::uint8_t>(std::floor(linearToSrgb(value) * 255.0 + 0.5));
-            }
-        }
-        clipped += clipped_here;
-    });
-    encoded.clipped_values = clipped;
-    return encoded;
-}
-
 void writeImage(const std::string& path, OutputFormat format, const Image& image) {
     if (image.width == 0 || image.height == 0) refuseToWrite(path, "the image has no pixels");
     if (image.pixels.size() != std::size_t{image.width} * image.height * image.channels.size() ||
@@ -407,17 +327,7 @@ void writeImage(const std::string& path, OutputFormat format, const Image& image
     } else {
         writePpm(path, image, encoded);
     }
-    if (const double brightest = largestColor(image);
-        brightest > 0 &&
-        std::all_of(encoded.rgb.begin(), encoded.rgb.end(), [](std::uint8_t v) { return v == 0; }))
-        logWarning(
-            "'{}' is black: its brightest value is {:.2g}, too dark for 8 bits; about {} stops more of "
-            "film.exposure_ev would show it",
-            path, brightest, std::ceil(std::log2(0.5 / brightest)));
-    if (encoded.clipped_values > 0)
-        logInfo(
-            "'{}': {:.2g} % of the colour values lie outside what 8 bits can show and were clipped", path,
-            100.0 * static_cast<double>(encoded.clipped_values) / static_cast<double>(encoded.rgb.size()));
+    tellWhatIsLost(path, image, encoded);
 }
 
 Image readImage(const std::string& path) {

@@ -11,10 +11,9 @@
 
 #include "base/atomic_file.h"
 #include "image/image.h"
+#include "image/srgb_encoding.h"
 #include "scene/scene.h"
-#include "spectra/spectra.h"
 
-#include <cstdint>
 #include <optional>
 #include <string>
 
@@ -35,17 +34,5 @@ Image readImage(const std::string& path);
 
 /// Value of a metadata key, or empty.
 std::string metadataValue(const Image& image, const std::string& key);
-
-/// From the image's colour space to linear sRGB; empty when it is sRGB already, which an image without
-/// chromaticities is taken for. Throws crt::Error(Output) for primaries that are none of sRGB's, ACEScg's
-/// and XYZ's.
-std::optional<Matrix3d> toLinearSrgb(const Image& image);
-
-/// 8-bit sRGB of an image, row-major, top row first, three bytes a pixel; what PNG and PPM hold.
-struct EncodedImage {
-    std::vector<std::uint8_t> rgb;
-    std::uint64_t clipped_values = 0;  ///< Of 3·width·height: those outside [0,1], NaN among them (as 0).
-};
-EncodedImage encodeSrgb8(const Image& image);
 
 }  // namespace crt

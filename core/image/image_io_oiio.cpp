@@ -206,6 +206,8 @@ std::int32_t writeExr(const char* path, const CrtImagePlanes* image, char* reaso
         if (image->adopted_neutral != nullptr)
             spec.attribute("adoptedNeutral", TypeDesc(TypeDesc::FLOAT, TypeDesc::VEC2),
                            image->adopted_neutral);
+        if (image->white_luminance_cd_m2 > 0)
+            spec.attribute("whiteLuminance", image->white_luminance_cd_m2);
         // Left to itself the library stamps the present time on every EXR, and the same image would never be
         // the same file.
         spec.attribute("DateTime", "");

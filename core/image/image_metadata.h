@@ -16,6 +16,8 @@ inline constexpr const char* kExposureKey =
     "crt/exposure";  ///< Stops: values were multiplied by 2 to this power.
 inline constexpr const char* kWhiteBalanceKey =
     "crt/whiteBalance";  ///< "none", or "x,y": chromaticity of the light that became white.
+/// OpenEXR's standard attribute: luminance of the colour (1, 1, 1), in cd/m².
+inline constexpr const char* kWhiteLuminanceKey = "whiteLuminance";
 /// Colour space of the pixels, by the names of the Color Interop Forum
 /// (https://github.com/AcademySoftwareFoundation/ColorInterop).
 inline constexpr const char* kColorInteropIdKey = "colorInteropID";

@@ -18,8 +18,8 @@ extern "C" {
 
 #define CRT_IMAGE_MODULE_FILE "crt_image_oiio.so"
 /* The symbol carries the version: a module of another version does not have it. */
-#define CRT_IMAGE_MODULE_ENTRY crt_image_module_v4
-#define CRT_IMAGE_MODULE_ENTRY_NAME "crt_image_module_v4"
+#define CRT_IMAGE_MODULE_ENTRY crt_image_module_v5
+#define CRT_IMAGE_MODULE_ENTRY_NAME "crt_image_module_v5"
 
 typedef struct CrtImageText {
     const char *name;
@@ -47,6 +47,7 @@ typedef struct CrtImagePlanes {
      * names; or null. */
     const float *world_to_camera, *world_to_ndc;
     const float *adopted_neutral;      /* to write only: {x, y}, or null */
+    float white_luminance_cd_m2;       /* to write only: of (1, 1, 1); 0: not known */
 } CrtImagePlanes;
 
 #define CRT_TEXELS_UINT8 0u

@@ -225,6 +225,8 @@ int runJob(const Job& job, Watch& watch) {
 
     // What is to be seen, and where it is to be written.
     Scene scene = loadScene(job.scene);
+    if (job.expose_automatically && scene.integrator.type != IntegratorType::Path)
+        throw Error(ErrorKind::Usage, "--expose auto is for integrator.type path: views show no light");
     if (job.target_error > 0) requireReplicates(scene);
     Files files = planFiles(job, scene);
 
@@ -256,6 +258,8 @@ int runJob(const Job& job, Watch& watch) {
     RunFacts& facts = run.facts;
     facts.command = job.command;
     FirstFailure failure(run.failure);
+    if (job.expose_automatically && run.film.samples.count() > 0)
+        exposeAutomatically(run.film, *run.identity.record);
     if (run.film.samples.count() > 0) writeFiles(files, run.film, run.identity, facts, failure);
     facts.warnings = warningCount();
     facts.total_seconds = total.seconds();

@@ -36,6 +36,7 @@ struct Job : RenderOptions {
     bool overwrite = false;                  ///< Also a film of more samples, or what is no film.
 
     std::vector<std::string> outputs;        ///< Instead of the scene's.
+    bool expose_automatically = false;       ///< By the film, instead of the scene's exposure.
     std::optional<std::string> report_file;  ///< Unset: beside the first output. Empty: none.
     std::string command;                     ///< As typed, for the report.
 };

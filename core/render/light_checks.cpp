@@ -10,6 +10,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <numbers>
 
 namespace crt {
 namespace {
@@ -143,6 +144,11 @@ std::vector<std::string> reasonsForBlack(const Scene& scene) {
         reasons.emplace_back("point, spot and directional lights are not seen by the camera, nor by way of "
                              "mirrors, smooth metals and glass");
     if (!scene.integrator.nee && !sky) reasons.emplace_back("with 'nee: false' few paths meet a small lamp");
+    constexpr double kNarrow = 0.028;  // As of a fov of pi degrees, which may be meant as radians.
+    if (const double tangent = std::min(scene.camera.tan_half_width, scene.camera.tan_half_height);
+        tangent < kNarrow)
+        reasons.push_back(fmt::format("'fov' is in degrees, and the camera sees {:.2g} of them",
+                                      std::atan(tangent) * (360 / std::numbers::pi)));
     reasons.emplace_back("the camera may be inside an object, or look past the scene");
     return reasons;
 }
@@ -164,6 +170,18 @@ std::vector<std::string> idleLamps(const Scene& scene) {
     return idle;
 }
 
+namespace {
+
+double brightestLuminance(const Film& film) {
+    double brightest = 0;
+    for (std::uint32_t y = 0; y < film.shape().height; ++y)
+        for (std::uint32_t x = 0; x < film.shape().width; ++x)
+            brightest = std::max(brightest, film.mean(x, y, 1));
+    return brightest;
+}
+
+}  // namespace
+
 void warnOfIdleLamps(const Scene& scene) {
     for (const std::string& lamp : idleLamps(scene))
         logWarning(
@@ -183,6 +201,27 @@ bool isBlack(const Film& film) {
         for (std::size_t i = 0; i < 6; ++i)  // X, Y and Z, each hi and lo.
             if (film.sums[pixel + i] != 0) return false;
     return true;
+}
+
+void warnOfLargeUnits(const Film& film, const Scene& scene) {
+    constexpr double kBlack = 1.5e-4;  // 8 bits of sRGB show less as 0.
+    constexpr double kFar = 30;        // In metres: rooms and stages are smaller.
+    if (scene.integrator.type != IntegratorType::Path || scene.metres_per_unit || film.samples.count() == 0)
+        return;
+    const PointLight* nearest = nullptr;
+    double distance = std::numeric_limits<double>::infinity();
+    for (const PointLight& light : scene.point_lights) {
+        const bool spreads = light.type == PointLightType::Point || light.type == PointLightType::Spot ||
+                             light.type == PointLightType::Ies;
+        const double away = length(light.position - scene.camera.position);
+        if (spreads && light.strength > 0 && away < distance) nearest = &light, distance = away;
+    }
+    if (nearest == nullptr || distance < kFar) return;
+    const double brightest = brightestLuminance(film) * std::exp2(scene.film.exposure_ev);
+    if (brightest <= 0 || brightest > kBlack) return;
+    logWarning("the picture is all but black: a scene unit counts as a metre, so the nearest light, '{}', "
+               "is {:.3g} m from the camera; where lengths are in millimetres write 'unit: mm'",
+               nearest->name, distance);
 }
 
 void warnOfBlackFilm(const Film& film, const Scene& scene) {

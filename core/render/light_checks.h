@@ -23,6 +23,10 @@ void warnOfMissingLight(const Scene& scene);
 /// Has no pixel got any light?
 bool isBlack(const Film& film);
 
+/// Warns of a picture that is black in 8 bits because its lights are thought to be kilometres away: the
+/// scene is in millimetres and does not say so.
+void warnOfLargeUnits(const Film& film, const Scene& scene);
+
 /// Warns when no pixel of the film has got any light, with what may be the reason in this scene.
 void warnOfBlackFilm(const Film& film, const Scene& scene);
 

@@ -1,14 +1,18 @@
-#include "film/resolve.h"
 #include "render/outputs.h"
 
 #include "base/atomic_file.h"
+#include "base/log.h"
+#include "film/auto_exposure.h"
 #include "film/checkpoint.h"
+#include "film/resolve.h"
 #include "image/image_io.h"
 #include "image/image_metadata.h"
+#include "scene/light_units.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <set>
 #include <utility>
@@ -95,6 +99,10 @@ Image developedImage(const Output& output, const Film& film, const FilmIdentity&
         add(kDisplayWhiteBalanceKey, whiteBalanceText(wanted));
     }
 
+    // In all three spaces (1, 1, 1) has Y = 1, and what a white balance makes white keeps its luminance.
+    if (record.holdsRadiance())
+        image.white_luminance_cd_m2 = luminanceOfUnitY_cd_m2() / std::exp2(applied.exposure_ev);
+
     const auto& [x0, y0, x1, y1] = record.window;
     if (record.isCropped())
         add("crt/crop", fmt::format("{},{},{},{} of {}x{}", x0, y0, x1, y1, record.width, record.height));
@@ -110,6 +118,15 @@ Image developedImage(const Output& output, const Film& film, const FilmIdentity&
         image.adopted_neutral = {white[0] / sum, white[1] / sum};
     }
     return image;
+}
+
+void exposeAutomatically(const Film& film, FilmRecord& record) {
+    if (!record.holdsRadiance())
+        throw Error(ErrorKind::Usage, "--expose auto is for integrator.type path: views show no light");
+    const std::optional<double> exposure_ev = autoExposure_ev(film);
+    if (!exposure_ev) return;  // A black film has its own warning.
+    record.development.exposure_ev = *exposure_ev;
+    logInfo("exposed automatically; --set film.exposure_ev={:g} gives the same picture", *exposure_ev);
 }
 
 void requireRecord(const std::string& path, const FilmIdentity& identity) {

@@ -34,6 +34,10 @@ std::string besideOutput(const std::string& output, const char* suffix);
 /// as metadata. The identity must have a record. Throws crt::Error(Usage) for an AOV that the film lacks.
 Image developedImage(const Output& output, const Film& film, const FilmIdentity& identity);
 
+/// Chooses the exposure by the film (auto_exposure.h), and says which: the record gets it, as if the scene
+/// had it. Throws crt::Error(Usage) for a view, whose colours are no light.
+void exposeAutomatically(const Film& film, FilmRecord& record);
+
 /// Refuses to develop a film that does not know how: crt::Error(Usage).
 void requireRecord(const std::string& path, const FilmIdentity& identity);
 

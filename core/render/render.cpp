@@ -85,6 +85,7 @@ void judge(const Film& film, const Scene& scene, RunFacts& facts) {
     facts.samples = film.samples;
     facts.invalid_samples = film.invalidSamples();
     warnOfBlackFilm(film, scene);
+    warnOfLargeUnits(film, scene);
     if (facts.invalid_samples > 0)
         logWarning("{} samples were no numbers (NaN or infinite) and were left out", facts.invalid_samples);
 }

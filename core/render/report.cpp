@@ -2,6 +2,7 @@
 
 #include "backend/loader.h"
 #include "base/host.h"
+#include "scene/light_units.h"
 #include "scene/missing_light.h"
 
 #include <fmt/format.h>
@@ -46,6 +47,7 @@ Json estimateJson(const std::optional<ErrorEstimate>& error) {
     if (!error) return nullptr;
     Json json{{"knowledge", knowledgeName(error->knowledge)},
               {"mean_luminance", error->mean_luminance},
+              {"mean_luminance_cd_m2", error->mean_luminance * luminanceOfUnitY_cd_m2()},
               {"degrees_of_freedom", error->degrees_of_freedom}};
     if (error->rare_paths > 0) json["rare_paths"] = error->rare_paths;
     // A number that cannot be trusted must not be read as one that can.
@@ -56,6 +58,8 @@ Json estimateJson(const std::optional<ErrorEstimate>& error) {
     json["half_width_95"] = error->half_width_95;
     json["mean_luminance_standard_error"] = error->mean_standard_error;
     json["mean_luminance_95"] = {mean.lower, mean.upper};
+    json["mean_luminance_95_cd_m2"] = {mean.lower * luminanceOfUnitY_cd_m2(),
+                                       mean.upper * luminanceOfUnitY_cd_m2()};
     return json;
 }
 

@@ -316,6 +316,7 @@ struct Output {
 struct Scene {
     std::string file;   ///< Path of the YAML, or a name for scenes made in memory.
     std::string title;
+    std::optional<double> metres_per_unit;  ///< Nothing: the scene does not say, and a unit is a metre.
     Camera camera;
     FilmSettings film;
     IntegratorSettings integrator;

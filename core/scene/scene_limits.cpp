@@ -64,14 +64,10 @@ std::vector<Light> lightsOf(const Scene& scene) {
     return lights;
 }
 
-std::string at(const SourcePlace& place) {
-    return place.line > 0 ? fmt::format("{}:{}:{}", place.file, place.line, place.column) : place.file;
-}
-
 [[noreturn]] void refuse(const Light& light, const std::string& sentence) {
     throw Error(ErrorKind::Scene,
                 fmt::format("{}: error: {}; multiply all lights by one factor, and the image by its inverse",
-                            at(light.place), sentence),
+                            light.place.text(), sentence),
                 light.place);
 }
 
@@ -118,8 +114,8 @@ void checkRadiance(const Scene& scene) {
                 "{} is the brightest light, of {} {:g}, and single precision carries light from {:g}",
                 brightest->name, brightest->quantity, brightest->radiance, kLeastRadiance));
     if (dimmest->radiance < static_cast<double>(std::numeric_limits<float>::min()))
-        logWarning("{}: {} has a {} of {:g}, below single precision: it does not shine", at(dimmest->place),
-                   dimmest->name, dimmest->quantity, dimmest->radiance);
+        logWarning("{}: {} has a {} of {:g}, below single precision: it does not shine",
+                   dimmest->place.text(), dimmest->name, dimmest->quantity, dimmest->radiance);
 }
 
 }  // namespace crt

@@ -1,4 +1,5 @@
-"""`crt` and `python -m crt`: the commands that are written in Python; all others are the program's."""
+"""`crt` and `python -m crt`: the commands that are written in Python; all others are the program's, which is
+given scenes of other renderers as scenes of crt."""
 
 import importlib
 import os
@@ -6,6 +7,7 @@ import sys
 
 from . import program
 from .errors import Error
+from .importers import is_foreign
 
 # Command: the module whose main(arguments) it is. It returns the exit code.
 COMMANDS = {"import": ".importers.command", "report": ".report", "slurm": ".slurm"}
@@ -17,6 +19,8 @@ def main(arguments=None):
         if arguments and arguments[0] in COMMANDS:
             return importlib.import_module(COMMANDS[arguments[0]], __package__).main(arguments[1:])
         path = str(program.path())
+        if any(map(is_foreign, arguments)):
+            arguments = importlib.import_module(".foreign_scenes", __package__).with_imported(arguments)
     except Error as error:
         print(f"crt: error: {error}", file=sys.stderr)
         return int(error.kind)

@@ -16,8 +16,8 @@ from harness import CliTest, read_bytes
 
 BASH, ZSH, FISH, GROFF = (shutil.which(name) for name in ("bash", "zsh", "fish", "groff"))
 COMMANDS = (
-    "render info compare merge develop converge reference verify plugins warm data schema help completion"
-    .split()
+    "render info compare merge develop converge reference verify plugins warm data schema version help "
+    "completion".split()
 )
 
 

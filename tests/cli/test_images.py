@@ -50,6 +50,22 @@ class Headers(CliTest):
             self.assertEqual(png["colorInteropID"], "srgb_rec709_display")
             self.assertIn("sRGB", [kind for kind, _ in png_chunks(self.path("a.png"))])
 
+    def test_the_luminance_of_white_is_said(self):
+        """683.002 lm/W times the integral of the CIE 1931 observer's y, 106.8569 nm."""
+        for options, factor in (
+            ([], 1),
+            (["--set", "film.color_space=acescg"], 1),
+            (["--set", "film.color_space=xyz"], 1),
+            (["--set", "film.exposure_ev=3"], 1),
+            (["--set", "film.exposure_ev=3", "--set", "film.apply_to_float=true"], 8),
+            (["--set", "film.white_balance=A", "--set", "film.apply_to_float=true"], 1),
+        ):
+            exr, _ = self.render(*options)
+            self.assertAlmostEqual(exr["whiteLuminance"] * factor, 72983.5, delta=0.5, msg=options)
+        self.assertRegex(self.crt("info", "a.exr").stdout, r"whiteLuminance +72983\.\d* cd/m")
+        exr, _ = self.render("--set", "integrator.type=normals")
+        self.assertNotIn("whiteLuminance", exr)
+
     def test_the_date_is_that_of_the_last_sample(self):
         exr, _ = self.render()
         self.assertEqual(exr["capDate"], "2023:11:14 22:13:20")

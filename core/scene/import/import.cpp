@@ -13,6 +13,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <utility>
 
 namespace crt {
 namespace {
@@ -64,6 +65,19 @@ std::string otherRendererOf(const std::string& path) {
 std::string importHint(const std::string& path) {
     return fmt::format("crt's Python package makes a scene of it: python3 -m crt import {} -o scene.yaml",
                        path);
+}
+
+std::string unreadFormatOf(const std::string& path) {
+    constexpr std::pair<const char*, const char*> kUnread[]{
+        {".blend", "Blender"}, {".fbx", "FBX"},       {".usd", "USD"},      {".usda", "USD"},
+        {".usdc", "USD"},      {".usdz", "USD"},      {".stl", "STL"},      {".dae", "COLLADA"},
+        {".3ds", "3ds Max"},   {".max", "3ds Max"},   {".abc", "Alembic"},  {".ma", "Maya"},
+        {".mb", "Maya"},       {".c4d", "Cinema 4D"}, {".skp", "SketchUp"}, {".3dm", "Rhino"},
+        {".step", "STEP"},     {".stp", "STEP"},      {".rad", "Radiance"}, {".lxs", "LuxCore"}};
+    const std::string extension = extensionOf(path);
+    for (const auto& [end, name] : kUnread)
+        if (extension == end) return name;
+    return {};
 }
 
 ImportedModel importModel(GltfFiles& files, const std::string& path, const ImportOptions& options) {

@@ -17,6 +17,8 @@ bool isModel(const std::string& path);
 std::string otherRendererOf(const std::string& path);
 /// What to do with such a scene: a command.
 std::string importHint(const std::string& path);
+/// "Blender": what has files with this end that crt does not read, as far as they are known; else empty.
+std::string unreadFormatOf(const std::string& path);
 
 struct ImportOptions {
     std::string folder;          ///< Of the scene: names of files are relative to it. Empty: the file's own.

@@ -137,7 +137,7 @@ void ObjectReader::addMaps(LoadedMesh& loaded, const std::string& path) {
                                       map->clamp ? TextureWrap::Clamp : TextureWrap::Repeat, map->place);
         } catch (const Error& e) {
             if (e.kind() == ErrorKind::Internal) throw;
-            logWarning("{}:{}: {}; {}", map->place.file, map->place.line, e.what(), instead);
+            logWarning("{}: {}; {}", map->place.text(), e.what(), instead);
         }
     };
     for (LoadedMaterial& material : loaded.materials) {

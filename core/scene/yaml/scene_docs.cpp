@@ -205,7 +205,9 @@ outputs:
 - All errors of a file are reported at once, each with its line, and crt ends with code 3. Spectra and
   materials that nothing uses are warnings.
 - `--set film.resolution=[128,128]` or `--set objects.0.material=red` changes a value before the scene is
-  checked. Lists go by index, from 0.
+  checked. Lists go by index, from 0. A key that is set takes the place of those that exclude it:
+  `--set camera.fov=50` that of a `focal_length` with its `sensor`. `null` takes an optional key away:
+  `--set objects.1.emission=null` switches a light off.
 - Editors that know JSON Schema check scenes while you type: save `crt schema` as `crt-scene-1.schema.json`
   and begin the scene with `# yaml-language-server: $schema=crt-scene-1.schema.json`.
 
@@ -220,13 +222,14 @@ does:
   the later one wins over the earlier. A value is replaced as a whole: a material is never made of two
   halves. What excludes it gives way too: an included `focal_length` with its `sensor` to a `fov`.
 - `objects` and `lights` are joined: those of the included files come first, in the order of the list.
-- `title` and `outputs` are those of the file that wins.
+- `title`, `unit` and `outputs` are those of the file that wins; two files with different units are an error.
 - `key: null` takes an included value away where `null` is a value of the key, such as `environment: null`.
 - A file that several files include counts once. A file that includes itself, directly or through others, is
   an error. Files may be included 16 deep.
 - Relative names of meshes and spectra are looked up beside the file that names them.
 - `--set` changes the result, so it reaches what was included too.
 - Spectra and materials of included files that nothing uses are no warning.
+- An included file that gives a `unit` gives it to the whole scene, as everything that stands in it does.
 
 ```yaml
 crt: 1
@@ -235,6 +238,21 @@ film: {exposure_ev: 1}
 objects:
   - {name: sphere, obj: sphere.obj, material: white, transform: [{scale: 280}, {translate: [278, 0, 290]}]}
 ```
+
+## What the numbers of an image are
+
+EXR and PFM files hold radiance in the colour space of the film: XYZ are ∫ L (x̄, ȳ, z̄) dλ / ∫
+ȳ dλ, with L in W·m⁻²·sr⁻¹·nm⁻¹, and RGB are linear in them. So a pixel with Y = 1, such as
+RGB (1, 1, 1), has the luminance 683.002 lm/W · 106.857 nm = 72,983 cd/m², and Y times that is the
+luminance of every pixel. In sRGB Y = 0.2126 R + 0.7152 G + 0.0722 B. EXR files say the number
+themselves, as OpenEXR's attribute `whiteLuminance` (`crt info a.exr` prints it), in each of the three
+colour spaces; where `apply_to_float` multiplies the values by 2^ev, it is divided by that. Spectral bins
+are radiance as it is, in W·m⁻²·sr⁻¹·nm⁻¹. The illuminance of a matt surface of reflectance
+ρ is π / ρ times its luminance. PNG and PPM are for screens: exposed, balanced, sRGB-encoded and
+clipped, and hold none of this. The mean luminance in `report.json` is in both units.
+
+`crt SCENE --expose auto` chooses `exposure_ev` by the picture, and prints it: the geometric mean of its
+luminance becomes 18 % grey.
 
 ## Named data
 

@@ -1,6 +1,7 @@
 #include "scene/yaml/scene_include.h"
 
 #include "base/input_file.h"
+#include "scene/yaml/scene_exclusion.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -59,26 +60,6 @@ YamlNodePtr joined(const YamlNode& below, const YamlNode& above) {
     return list;
 }
 
-/// Keys that an included section loses because of what `above` gives: those that exclude it, and what goes
-/// together with them. An included focal_length and its sensor give way to a fov.
-std::set<std::string> givingWay(const SectionSchema& section, const YamlNode& above) {
-    std::set<std::string> gone;
-    const auto given = [&above](const std::string& key) { return above.find(key) != nullptr; };
-    const auto drop = [&](const KeyRule& rule) {
-        for (const std::string& key : rule.keys)
-            if (!given(key)) gone.insert(key);
-    };
-    for (const KeyRule& rule : section.rules)
-        if (rule.kind != KeyRule::Kind::Together && std::any_of(rule.keys.begin(), rule.keys.end(), given))
-            drop(rule);
-    for (const KeyRule& rule : section.rules)
-        if (rule.kind == KeyRule::Kind::Together &&
-            std::any_of(rule.keys.begin(), rule.keys.end(),
-                        [&gone](const std::string& key) { return gone.contains(key); }))
-            drop(rule);
-    return gone;
-}
-
 /// Keys of both; where both have one, that of `above`.
 YamlNodePtr keyByKey(const YamlNode& below, const YamlNode& above, const std::set<std::string>& gone = {}) {
     auto map = std::make_shared<YamlNode>(above);
@@ -96,12 +77,25 @@ YamlNodePtr keyByKey(const YamlNode& below, const YamlNode& above, const std::se
     return map;
 }
 
-/// Of a key of the scene that holds one section; nothing is excluded in the others.
-std::set<std::string> givingWay(const std::string& key, const YamlNode& above) {
+/// What `below` loses of a key of the scene that holds one section; nothing is excluded in the others.
+std::set<std::string> lostBelow(const std::string& key, const YamlNode& above) {
     const KeySchema* schema = schemaSection("").find(key);
     const bool section = schema != nullptr && schema->kind == ValueKind::Section &&
                          schema->shape == ValueShape::One;
-    return section ? givingWay(schemaSection(schema->section), above) : std::set<std::string>();
+    if (!section) return {};
+    return givingWay(schemaSection(schema->section),
+                     [&above](const std::string& name) { return above.find(name) != nullptr; });
+}
+
+/// Lengths of two files under two units would not fit together.
+void checkUnits(const YamlNode& below, const YamlNode& above, Diagnostics& out) {
+    const YamlEntry *lower = below.find("unit"), *upper = above.find("unit");
+    if (lower == nullptr || upper == nullptr || lower->value->text == upper->value->text) return;
+    out.error(upper->place,
+              fmt::format("the unit is '{}' here and '{}' in {}: files that are read as one scene count in "
+                          "one unit",
+                          upper->value->text, lower->value->text, lower->place.resolved().text()),
+              "leave one of them out, and scale the lengths of its file");
 }
 
 /// Two scenes as one. Sections, `spectra` and `materials` key by key, `objects` and `lights` joined;
@@ -112,7 +106,7 @@ YamlNodePtr merged(const YamlNode& below, const YamlNode& above) {
         const YamlEntry *lower = below.find(entry.key), *upper = above.find(entry.key);
         if (lower == nullptr || upper == nullptr) continue;
         if (lower->value->kind == YamlKind::Map && upper->value->kind == YamlKind::Map)
-            entry.value = keyByKey(*lower->value, *upper->value, givingWay(entry.key, *upper->value));
+            entry.value = keyByKey(*lower->value, *upper->value, lostBelow(entry.key, *upper->value));
         else if (isJoined(entry.key) && lower->value->kind == YamlKind::List &&
                  upper->value->kind == YamlKind::List)
             entry.value = joined(*lower->value, *upper->value);
@@ -156,11 +150,14 @@ YamlNodePtr SceneIncludes::withIncludes(YamlNodePtr root) {
     for (const auto& [name, place] : names) {
         const YamlNodePtr part = readIncluded(name, place);
         if (!part || part->kind != YamlKind::Map) continue;
+        if (below) checkUnits(*below, *part, out_);
         below = below ? merged(*below, *part) : part;
     }
     auto own = std::make_shared<YamlNode>(*root);
     std::erase_if(own->entries, [](const YamlEntry& entry) { return entry.key == "include"; });
-    return below ? merged(*below, *own) : own;
+    if (!below) return own;
+    checkUnits(*below, *own, out_);
+    return merged(*below, *own);
 }
 
 YamlNodePtr SceneIncludes::readIncluded(const std::string& name, const YamlPlace& place) {

@@ -161,6 +161,25 @@ void readBrightness(const SectionReader& section, SpectrumReader& spectra, Point
     }
 }
 
+/// Whether the light is given by an amount that spreads over square metres before it lights a surface.
+bool spreadsOverArea(const SectionReader& section, const PointLight& light) {
+    switch (light.type) {
+        case PointLightType::Point:
+        case PointLightType::Spot:
+        case PointLightType::Ies: return true;
+        case PointLightType::Beam: return section.has("power_w") || section.has("luminous_flux_lm");
+        case PointLightType::Directional:
+        case PointLightType::Sun: break;
+    }
+    return false;
+}
+
+/// Distances stay in the scene's units: what a square metre gets is given to the square of as many units.
+void countInUnits(const SectionReader& section, const Scene& scene, PointLight& light) {
+    const double metres = scene.metres_per_unit.value_or(1);
+    if (metres != 1 && spreadsOverArea(section, light)) light.strength /= metres * metres;
+}
+
 /// Light that nothing finds would be missing from the image without a word.
 void checkFound(const SectionReader& section, const PointLight& light,
                 const IntegratorSettings& integrator) {
@@ -203,6 +222,7 @@ void readLights(const YamlNode& list, Diagnostics& out, SceneFiles& files, Spect
                 light.direction = *sun * -1;
         }
         readBrightness(*section, spectra, light);
+        countInUnits(*section, scene, light);
         checkFound(*section, light, scene.integrator);
         scene.point_lights.push_back(std::move(light));
     }

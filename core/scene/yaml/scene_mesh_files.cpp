@@ -195,11 +195,10 @@ void ObjectReader::checkMaterials(const SectionReader& object, const LoadedMesh&
                                                             [](std::int32_t m) { return m < 0; });
     if (!use.material.empty()) {
         if (bare > 0) return;
-        const SourcePlace at = object.place("material").resolved();
         logInfo(
-            "{}:{}:{}: {} has no face for material '{}': the OBJ gives each its own; 'override: true' "
-            "replaces them all",
-            at.file, at.line, at.column, object.subject(), use.material);
+            "{}: {} has no face for material '{}': the OBJ gives each its own; 'override: true' replaces "
+            "them all",
+            object.place("material").resolved().text(), object.subject(), use.material);
         return;
     }
     if (bare == 0) return;

@@ -410,9 +410,8 @@ std::optional<std::uint32_t> ObjectReader::readMesh(const SectionReader& section
     }
     if (out_.count() != errors_before) return std::nullopt;
     if (dropped > 0) {
-        const SourcePlace at = section.place("faces").resolved();
-        logWarning("{}:{}:{}: {} triangles of {} without area were left out", at.file, at.line, at.column,
-                   dropped, section.subject());
+        logWarning("{}: {} triangles of {} without area were left out",
+                   section.place("faces").resolved().text(), dropped, section.subject());
     }
     if (!mesh.normals.empty()) mesh.normal_index = mesh.triangles;
     if (!mesh.uvs.empty()) mesh.uv_index = mesh.triangles;

@@ -1,8 +1,9 @@
 // Over 450 lines: one class, with a short function for each kind of value that a key can have.
-#include "base/modules.h"
 #include "scene/yaml/scene_reader.h"
 
 #include "base/log.h"
+#include "base/modules.h"
+#include "scene/yaml/scene_hints.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -91,10 +92,9 @@ void addFileNames(const fs::path& directory, std::vector<std::string>& names) {
 }  // namespace
 
 void expected(Diagnostics& out, const YamlPlace& place, std::string_view wanted, const std::string& what,
-              const YamlNode& node) {
+              const YamlNode& node, std::string hint) {
     if (node.reported) return;
-    std::string hint;
-    if (node.kind == YamlKind::Scalar && node.quoted && looksLikeNumber(node.text))
+    if (hint.empty() && node.kind == YamlKind::Scalar && node.quoted && looksLikeNumber(node.text))
         hint = "leave the quotes out";
     out.error(place, fmt::format("expected {} for {}, found {}", wanted, what, describeNode(node)),
               std::move(hint));
@@ -134,7 +134,7 @@ bool readText(Diagnostics& out, const YamlNode& node, const YamlPlace& place, co
 }
 
 bool readChoice(Diagnostics& out, const YamlNode& node, const YamlPlace& place, const KeySchema& key,
-                const std::string& what, std::size_t& value) {
+                const std::string& what, std::size_t& value, const std::string& hint) {
     const std::string wanted = key.choices.size() == 1
                                    ? key.choices.front()
                                    : fmt::format("one of {}", fmt::join(key.choices, ", "));
@@ -145,7 +145,7 @@ bool readChoice(Diagnostics& out, const YamlNode& node, const YamlPlace& place, 
     const auto found = std::find(key.choices.begin(), key.choices.end(), node.text);
     if (found == key.choices.end()) {
         out.error(place, fmt::format("expected {} for {}, found {}", wanted, what, describeNode(node)),
-                  didYouMean(node.text, key.choices));
+                  hint.empty() ? didYouMean(node.text, key.choices) : hint);
         return false;
     }
     value = static_cast<std::size_t>(found - key.choices.begin());
@@ -161,7 +161,7 @@ SectionReader::SectionReader(Diagnostics& out, const YamlNode& node, const YamlP
                              const SectionSchema& schema, std::string subject)
     : out_(&out), node_(&node), place_(place), schema_(&schema), subject_(std::move(subject)) {
     if (node.kind != YamlKind::Map) {
-        expected(out, place, "a map", subject_, node);
+        expected(out, place, "a map", subject_, node, hintOfMissingMap(schema, node));
         return;
     }
     checkKeys();
@@ -174,7 +174,8 @@ void SectionReader::checkKeys() const {
     for (const YamlEntry& entry : node_->entries) {
         if (schema_->find(entry.key) != nullptr) continue;
         if (const std::optional<std::string> meant = nearestWord(entry.key, names)) misspelt.insert(*meant);
-        std::string suggestion = didYouMean(entry.key, names);
+        std::string suggestion = hintOfForeignWord(schema_->name, entry.key);
+        if (suggestion.empty()) suggestion = didYouMean(entry.key, names);
         if (const auto homes = sectionsWithKey(entry.key, schema_->name);
             suggestion.empty() && !homes.empty())
             suggestion = fmt::format("'{}' is a key of {}", entry.key, homes.front());
@@ -367,7 +368,9 @@ std::optional<SectionReader> openVariant(Diagnostics& out, const YamlNode& node,
         }
         KeySchema any{.name = "type", .kind = ValueKind::Choice, .choices = words};
         std::size_t index = 0;
-        if (!readChoice(out, *type->value, type->place, any, "'type'", index)) return std::nullopt;
+        if (!readChoice(out, *type->value, type->place, any, "'type'", index,
+                        hintOfForeignWord(family, type->value->text)))
+            return std::nullopt;
         return SectionReader(out, node, place, *variants[index], subject);
     }
 
@@ -404,8 +407,7 @@ constexpr std::size_t kUnusedShown = 20;
 void UnusedNames::add(const std::string& name, const YamlPlace& place) {
     if (place.source != nullptr && place.source->included) return;
     if (++count_ > kUnusedShown) return;
-    const SourcePlace at = place.resolved();
-    logWarning("{}:{}:{}: {} '{}' is not used", at.file, at.line, at.column, one_, name);
+    logWarning("{}: {} '{}' is not used", place.resolved().text(), one_, name);
 }
 
 void UnusedNames::finish() const {
@@ -481,8 +483,7 @@ std::string sentenceWithPlace(const Error& error) {
     const std::string sentence = error.what();
     const SourcePlace& at = error.place();
     if (at.file.empty() || sentence.starts_with(at.file)) return sentence;
-    return at.line > 0 ? fmt::format("{}:{}: {}", at.file, at.line, sentence)
-                       : fmt::format("{}: {}", at.file, sentence);
+    return fmt::format("{}: {}", at.text(), sentence);
 }
 
 }  // namespace crt

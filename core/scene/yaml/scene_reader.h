@@ -28,9 +28,9 @@ bool readScalar(Diagnostics& out, const YamlNode& node, const YamlPlace& place, 
                 const std::string& what, std::uint64_t& value);
 bool readText(Diagnostics& out, const YamlNode& node, const YamlPlace& place, const std::string& what,
               std::string& value);
-/// Index into key.choices.
+/// Index into key.choices. `hint` goes before the nearest of them.
 bool readChoice(Diagnostics& out, const YamlNode& node, const YamlPlace& place, const KeySchema& key,
-                const std::string& what, std::size_t& value);
+                const std::string& what, std::size_t& value, const std::string& hint = {});
 /// A list of numbers with key.count_min to key.count_max members.
 bool readNumbers(Diagnostics& out, const YamlNode& node, const YamlPlace& place, const KeySchema& key,
                  const std::string& what, std::vector<double>& values);
@@ -101,9 +101,9 @@ private:
 std::optional<SectionReader> openVariant(Diagnostics& out, const YamlNode& node, const YamlPlace& place,
                                          std::string_view family, const std::string& subject);
 
-/// "expected …, found …" at a place.
+/// "expected …, found …" at a place, and what to write instead where that is known.
 void expected(Diagnostics& out, const YamlPlace& place, std::string_view wanted, const std::string& what,
-              const YamlNode& node);
+              const YamlNode& node, std::string hint = {});
 
 /// Warns about names that nothing uses: the first by name and place, the others by their number. Not about
 /// those of included files, which are made to be chosen from.

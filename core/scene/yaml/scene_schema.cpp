@@ -2,6 +2,7 @@
 #include "scene/yaml/scene_schema.h"
 
 #include "base/error.h"
+#include "scene/length_unit.h"
 #include "scene/scene.h"
 #include "scene/scene_limits.h"
 #include "scene/yaml/scene_schema_composition.h"
@@ -73,6 +74,16 @@ SectionSchema topLevel() {
                 {.name = "title",
                  .doc = "What the scene shows. crt writes it into image metadata and the "
                         "report."},
+                {.name = "unit",
+                 .kind = Kind::Choice,
+                 .choices = lengthUnitNames(),
+                 .fallback = "m",
+                 .doc = "What one scene unit is: of the camera, of meshes and the files that they are in, "
+                        "of transforms, and of `absorption`. These numbers stay as they are written. "
+                        "The unit matters to lights without a surface, whose watts, lumens and candelas "
+                        "spread over square metres: with `mm`, a light at distance 2000 is 2 m away. "
+                        "Radiance, irradiance, luminance and illuminance do not depend on it. An included "
+                        "file that gives another unit is an error."},
                 {.name = "camera", .kind = Kind::Section, .section = "camera", .doc = "The viewpoint."},
                 {.name = "film",
                  .kind = Kind::Section,

@@ -2,6 +2,7 @@
 
 #include "base/log.h"
 #include "base/modules.h"
+#include "scene/yaml/scene_hints.h"
 #include "spectra/data_catalogue.h"
 
 #include <fmt/format.h>
@@ -20,6 +21,8 @@ namespace {
 
 /// How many spectra may each be the name of the next.
 constexpr std::size_t kDeepestSpectrum = 64;
+
+bool takesColors(SpectrumUse use) { return use != SpectrumUse::Index && use != SpectrumUse::Response; }
 
 /// The wavelength where a spectrum is worst: first where it is not finite, else farthest outside `range`.
 std::optional<std::size_t> worstWavelength(const Spectrum& spectrum, const ValueRange& range) {
@@ -114,7 +117,8 @@ std::optional<Spectrum> SpectrumReader::resolve(const YamlNode& node, const Yaml
         return spectrum ? scaled(*std::move(spectrum), scale) : spectrum;
     }
     if (node.kind != YamlKind::Scalar) {
-        expected(out_, place, "a number, the name of a spectrum or a map", what, node);
+        expected(out_, place, "a number, the name of a spectrum or a map", what, node,
+                 takesColors(use) ? hintOfColor(node, place) : "");
         return std::nullopt;
     }
     if (!node.quoted && looksLikeNumber(node.text)) {
@@ -145,6 +149,7 @@ std::optional<Spectrum> SpectrumReader::resolveName(const std::string& name, con
         if (suggestion.empty() && illuminantSpectrum(name))
             suggestion = fmt::format("write {{illuminant: {}}}", name);
         if (suggestion.empty() && glassIndex(name)) suggestion = fmt::format("write {{glass: {}}}", name);
+        if (suggestion.empty() && takesColors(use)) suggestion = hintOfColorName(name);
         out_.error(place, fmt::format("there is no spectrum '{}'", name), suggestion);
         return std::nullopt;
     }

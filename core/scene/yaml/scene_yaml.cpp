@@ -4,12 +4,14 @@
 #include "base/input_file.h"
 #include "base/log.h"
 #include "scene/import/import.h"
+#include "scene/length_unit.h"
 #include "scene/scene_limits.h"
 #include "scene/yaml/composed_text.h"
 #include "scene/yaml/scene_environment.h"
 #include "scene/yaml/scene_include.h"
 #include "scene/yaml/scene_lights.h"
 #include "scene/yaml/scene_objects.h"
+#include "scene/yaml/scene_override.h"
 #include "scene/yaml/scene_reader.h"
 #include "scene/yaml/scene_schema.h"
 #include "scene/yaml/scene_spectra.h"
@@ -30,139 +32,6 @@
 
 namespace crt {
 namespace {
-
-// ---- Overrides ------------------------------------------------------------------------------------------
-
-/// One `--set` argument on its way down the tree.
-class OverrideWalk {
-public:
-    OverrideWalk(const SceneOverride& change, const YamlSource& source, Diagnostics& out)
-        : path_(change.path), source_(source), out_(out) {}
-
-    /// Puts `value` where the path leads. Nodes on the way are copied first, because aliases share them.
-    /// Maps that the file leaves out are made; the check of the whole scene then finds keys that do not
-    /// exist, with the place in the argument.
-    void apply(YamlNodePtr& slot, const YamlNodePtr& value, std::size_t at = 0) {
-        if (++parts_ > kDeepestPath) {
-            out_.error(place(0, path_.size()),
-                       fmt::format("a path of more than {} parts leads nowhere in a scene", kDeepestPath));
-            return;
-        }
-        slot = std::make_shared<YamlNode>(*slot);
-        if (slot->kind == YamlKind::Null) slot->kind = YamlKind::Map;
-        switch (slot->kind) {
-            case YamlKind::Map: return applyToMap(*slot, value, at);
-            case YamlKind::List: return applyToList(*slot, value, at);
-            case YamlKind::Scalar:
-            case YamlKind::Null: break;
-        }
-        const std::string_view before = std::string_view(path_).substr(0, at > 0 ? at - 1 : 0);
-        out_.error(place(at, path_.size() - at),
-                   fmt::format("'{}' is {} here, so there is nothing inside it to set", before,
-                               describeNode(*slot)),
-                   fmt::format("set '{}' as a whole", before));
-    }
-
-private:
-    static constexpr int kDeepestPath = 64;  // As deep as YAML may be.
-
-    YamlPlace place(std::size_t at, std::size_t length) const {
-        return {&source_, 1, static_cast<int>(at) + 1, static_cast<int>(std::max<std::size_t>(length, 1))};
-    }
-
-    /// Length of the next part of the path. Names may hold dots ("Material.001"), so a key that is there
-    /// wins over the first dot.
-    std::size_t partLength(const YamlNode& map, std::size_t at) const {
-        const std::string_view rest = std::string_view(path_).substr(at);
-        std::size_t longest = 0;
-        for (const YamlEntry& e : map.entries)
-            if (rest.starts_with(e.key) && (rest.size() == e.key.size() || rest[e.key.size()] == '.'))
-                longest = std::max(longest, e.key.size());
-        return longest > 0 ? longest : std::min(rest.find('.'), rest.size());
-    }
-
-    void applyToMap(YamlNode& map, const YamlNodePtr& value, std::size_t at) {
-        const std::size_t length = partLength(map, at);
-        const std::string key = path_.substr(at, length);
-        const bool last = at + length == path_.size();
-        const auto entry = std::find_if(map.entries.begin(), map.entries.end(),
-                                        [&](const YamlEntry& e) { return e.key == key; });
-        if (entry != map.entries.end()) {
-            if (!last) return apply(entry->value, value, at + length + 1);
-            entry->key_place = place(at, length);
-            entry->place = value->place;
-            entry->value = value;
-            return;
-        }
-        if (!last && namesAreFree(at)) {
-            std::vector<std::string> names;
-            for (const YamlEntry& e : map.entries) names.push_back(e.key);
-            out_.error(place(at, length),
-                       fmt::format("there is no '{}' in '{}'", key, path_.substr(0, at - 1)),
-                       didYouMean(key, names));
-            return;
-        }
-        YamlNodePtr node = value;
-        if (!last) {
-            node = std::make_shared<YamlNode>();
-            node->place = place(at, length);
-            apply(node, value, at + length + 1);
-        }
-        map.entries.push_back({key, place(at, length), node->place, node});
-    }
-
-    /// Directly inside `materials` or `spectra`, where a misspelt name must not make a new entry.
-    bool namesAreFree(std::size_t at) const {
-        if (at == 0) return false;
-        const KeySchema* key = schemaSection("").find(std::string_view(path_).substr(0, at - 1));
-        return key != nullptr && key->shape == ValueShape::Map;
-    }
-
-    void applyToList(YamlNode& list, const YamlNodePtr& value, std::size_t at) {
-        const std::size_t length = std::min(path_.find('.', at), path_.size()) - at;
-        const Parsed<std::uint64_t> index = parseUnsigned(path_.substr(at, length));
-        if (!index.value || *index.value >= list.items.size()) {
-            const std::string list_name = path_.substr(0, at > 0 ? at - 1 : 0);
-            out_.error(place(at, length),
-                       list.items.empty()
-                           ? fmt::format("'{}' is an empty list", list_name)
-                           : fmt::format("'{}' is a list; expected an index from 0 to {}, found '{}'",
-                                         list_name, list.items.size() - 1, path_.substr(at, length)));
-            return;
-        }
-        YamlNodePtr& item = list.items[*index.value];
-        if (at + length == path_.size())
-            item = value;
-        else
-            apply(item, value, at + length + 1);
-    }
-
-    std::string path_;
-    const YamlSource& source_;
-    Diagnostics& out_;
-    int parts_ = 0;
-};
-
-void applyOverrides(YamlNodePtr& root, const std::vector<SceneOverride>& overrides,
-                    std::deque<YamlSource>& sources, Diagnostics& out) {
-    for (const SceneOverride& change : overrides) {
-        const YamlSource& source = sources.emplace_back(fmt::format("--set {}", change.path),
-                                                        change.path + "=" + change.value, true);
-        const std::size_t before = out.count();
-        if (change.path == "include" || change.path.starts_with("include.")) {
-            out.error({&source, 1, 1, static_cast<int>(change.path.size())},
-                      "'include' cannot be set: --set changes what the files say together");
-            continue;
-        }
-        const YamlNodePtr value =
-            readYaml(source, change.value, out, static_cast<int>(change.path.size()) + 1);
-        if (value)
-            OverrideWalk(change, source, out).apply(root, value);
-        else if (out.count() == before)
-            out.error({&source, 1, static_cast<int>(change.path.size()) + 1, 1},
-                      "there is no value after '='; null says none");
-    }
-}
 
 // ---- Sections -------------------------------------------------------------------------------------------
 
@@ -270,11 +139,9 @@ void readCamera(const SectionReader& section, std::size_t errors_before, const F
         constexpr double kSquareEnough = 1e-3;
         const double pixel_aspect = sensor[0] / sensor[1] * film.height / film.width;
         if (std::abs(pixel_aspect - 1) > kSquareEnough) {
-            const SourcePlace at = section.place("sensor").resolved();
-            logWarning(
-                "{}:{}:{}: sensor and resolution have different proportions: "
-                "pixels are {:.4g} times as wide as high",
-                at.file, at.line, at.column, pixel_aspect);
+            logWarning("{}: sensor and resolution have different proportions: pixels are {:.4g} times as "
+                       "wide as high",
+                       section.place("sensor").resolved().text(), pixel_aspect);
         }
     }
     section.read("aperture_radius", camera.aperture_radius);
@@ -348,6 +215,7 @@ void readScene(const YamlNode& root, Diagnostics& out, SceneFiles& files, GltfFi
     int version = 1;
     top.read("crt", version);
     top.read("title", scene.title);
+    if (std::size_t unit = 0; top.readEnum("unit", unit)) scene.metres_per_unit = kLengthUnits[unit].metres;
 
     SpectrumReader spectra(out, files, top.map("spectra"));
     if (const auto section = top.section("film", "film")) readFilm(*section, spectra, scene.film);
@@ -463,6 +331,12 @@ Scene loadScene(const std::string& path, const std::vector<SceneOverride>& overr
     if (!other.empty() && std::filesystem::exists(path))
         throw Error(ErrorKind::Scene,
                     fmt::format("{}: error: this is a scene of {}; {}", path, other, importHint(path)),
+                    {path});
+    if (const std::string format = unreadFormatOf(path); !format.empty() && std::filesystem::exists(path))
+        throw Error(ErrorKind::Scene,
+                    fmt::format("{}: error: this is a file of {}, and crt reads .yaml, .glb, .gltf, .obj "
+                                "and .ply; export it as .glb or .obj",
+                                path, format),
                     {path});
     const std::string text = readSceneText(path);
     SceneFiles files(std::filesystem::path(path).parent_path().string());

@@ -401,9 +401,7 @@ void Diagnostics::throwIfFailed() const {
         const Entry& e = *order[i];
         const SourcePlace at = e.place.resolved();
         if (i > 0) text += '\n';
-        text += at.file;
-        if (at.line > 0) text += fmt::format(":{}:{}", at.line, at.column);
-        text += fmt::format(": error: {}", e.message);
+        text += fmt::format("{}: error: {}", at.text(), e.message);
         const bool has_line = e.place.source != nullptr && e.place.line > 0 && e.place.column > 0 &&
                               static_cast<std::size_t>(e.place.line) <= e.place.source->lines.size();
         if (has_line)

@@ -1,0 +1,26 @@
+/// The Python that runs what crt has written in it: pages of reports, and scenes of other renderers.
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace crt {
+
+/// The one that CRT_PYTHON names, else python3; empty where CRT_PYTHON is, which asks for none.
+std::string pythonProgram();
+
+/// How a program ended, and what it said on stderr.
+struct EndedProgram {
+    int error = 0;   ///< Of starting it, as in errno.
+    int status = 0;  ///< Of waitpid.
+    std::string said;
+};
+
+/// Runs it and waits, without input and without its output.
+EndedProgram runProgram(std::vector<std::string> words);
+
+/// Puts `python -m crt ARGUMENTS` in the place of this process; does not return then. Returns where that
+/// Python has no package crt of this project. The package runs this very program in turn.
+void becomePythonPackage(const std::vector<std::string>& arguments);
+
+}  // namespace crt

@@ -1,0 +1,192 @@
+#!/usr/bin/env python3
+"""What someone meets who is new: versions, names of other programs' things, pictures that are too bright or
+black, exposures, units, and scenes of other renderers.
+
+    test_first_steps.py CRT CONFIG_DIR FAKE_PLUGIN_DIR [unittest arguments]
+"""
+
+import math
+import os
+import re
+import stat
+import struct
+
+import harness
+from harness import LIT, SCENE, CliTest, LightTest, read_pfm
+
+WHITE_CD_M2 = 72983.5  # Of a pixel with Y = 1.
+
+# A floor of reflectance 0.5, below a lamp of 800 lm, seen straight on; lengths times the factor.
+BULB = """\
+crt: 1
+camera: {{position: [0, {0}, 0], target: [0, 0, 0], up: [0, 0, 1], fov: 1}}
+film: {{resolution: [1, 1]}}
+integrator: {{max_depth: 1}}
+materials: {{grey: {{type: diffuse, reflectance: 0.5}}}}
+lights: [{{name: bulb, type: point, position: [0, {1}, 0], luminous_flux_lm: 800}}]
+objects:
+  - rectangle: {{size: [{1}, {1}]}}
+    material: grey
+    transform: [{{rotate: {{axis: [1, 0, 0], angle_deg: -90}}}}]
+"""
+BULB_Y = 800 / (4 * math.pi) / 2 ** 2 * 0.5 / math.pi / WHITE_CD_M2
+
+
+class Names(CliTest):
+    def test_the_version_by_every_way(self):
+        version = self.crt("--version").stdout
+        self.assertRegex(version, r"^crt \d+\.\d+\.\d+\n$")
+        self.assertEqual(self.crt("version").stdout, version)
+        self.assertRegex(self.crt("--help").stdout, r"(?m)^  --version  ")
+
+    def test_a_backend_that_there_is_not(self):
+        run = self.crt("scene.yaml", "-b", "cpu", expect=4)
+        self.assert_one_error(run, "backends are", "cuda", "embree", "opencl", "fake")
+
+    def test_files_of_other_programs(self):
+        for name, program in (("a.blend", "Blender"), ("a.FBX", "FBX"), ("a.usdz", "USD"), ("a.stl", "STL")):
+            self.write(name, "")
+            self.assert_one_error(self.crt(name, expect=3), program, ".yaml, .glb, .gltf, .obj and .ply")
+
+    def test_a_folder_that_takes_no_files(self):
+        run = self.crt("scene.yaml", "-b", "fake", "-o", "/proc/x.png", expect=6)
+        self.assert_one_error(run, "the folder '/proc' takes no files")
+
+    def test_what_a_kernel_leaves_out_is_listed_on_demand(self):
+        short, long = self.crt("info", "scene.yaml").stdout, self.crt("info", "-v", "scene.yaml").stdout
+        self.assertRegex(short, r"left out +\d+ features of the kernel; --verbose lists them\n")
+        self.assertGreater(len(long.splitlines()), len(short.splitlines()) + 10)
+
+    def test_an_argument_is_named_once(self):
+        self.crt("scene.yaml", "-b", "fake", "-o", "square.exr", "--set", "film.resolution=[8, 8]")
+        run = self.crt("scene.yaml", "-b", "fake", "--set", "environment.image=square.exr", expect=3)
+        self.assertEqual(run.stderr.count("--set environment.image"), 1, run.stderr)
+        self.assertNotIn(":0:0", run.stderr)
+        run = self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", "--set",
+                       "camera={position: [0, 1, -4], focal_length: 1, sensor: [1, 1]}")
+        self.assertIn("--set camera: sensor and resolution", run.stderr)
+
+    def test_eight_bits_hold_no_sun(self):
+        self.crt("scene.yaml", "-b", "fake", "-o", "sky.png", "--set", "film.resolution=[16, 8]")
+        with open(self.path("sky.pfm"), "wb") as file:
+            file.write(b"PF\n2 1\n-1\n" + struct.pack("<6f", *[1] * 6))
+        for name, warned in (("sky.png", True), ("sky.pfm", False)):
+            run = self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", "--set", f"environment.image={name}")
+            self.assertEqual("neither the sun nor lamps" in run.stderr, warned, run.stderr)
+
+
+class Exposure(CliTest):
+    def setUp(self):
+        super().setUp()
+        self.write("lit.yaml", LIT)
+
+    def test_a_picture_that_is_too_bright_says_by_how_much(self):
+        def render(stops):
+            exposure = f"film.exposure_ev={stops}"
+            return self.crt("lit.yaml", "-b", "fake", "-o", "a.png", "--set", exposure).stderr
+
+        said = re.search(r"warning: 'a.png': .* about ([\d.]+) stops less of film.exposure_ev", render(6))
+        self.assertTrue(said)
+        self.assertNotIn("too bright", render(6 - float(said[1])))
+        self.assertIn("too bright", render(6 - float(said[1]) + 1))
+
+    def test_auto_is_an_exposure_that_can_be_written_down(self):
+        run = self.crt("lit.yaml", "-b", "fake", "-o", "a.ppm", "-o", "a.pfm", "-o", "a.crtfilm", "--expose",
+                       "auto", "--set", "film.exposure_ev=9")
+        exposure = re.search(r"--set film\.exposure_ev=(-?[\d.]+) gives the same picture", run.stderr)[1]
+        _, _, values = read_pfm(self.path("a.pfm"))  # Radiance, whatever the exposure.
+        luminances = [0.2126 * r + 0.7152 * g + 0.0722 * b
+                      for r, g, b in zip(values[0::3], values[1::3], values[2::3])]
+        mean = sum(luminances) / len(luminances)
+        logs = [math.log2(y) for y in luminances if y > mean / 1000]
+        self.assertAlmostEqual(float(exposure), math.log2(0.18) - sum(logs) / len(logs), delta=0.011)
+        self.crt("lit.yaml", "-b", "fake", "-o", "b.ppm", "--set", "film.exposure_ev=" + exposure)
+        self.assertEqual(self.bytes("a.ppm"), self.bytes("b.ppm"))
+        # The film knows it, and develop chooses the same.
+        self.assertIn(f"exposure {float(exposure):+g} EV", self.crt("info", "a.crtfilm").stdout)
+        self.crt("develop", "a.crtfilm", "-o", "c.ppm", "--expose", "auto", "--set", "film.exposure_ev=1")
+        self.assertEqual(self.bytes("a.ppm"), self.bytes("c.ppm"))
+
+    def test_auto_is_refused_of_views_and_of_other_words(self):
+        self.assert_one_error(self.crt("lit.yaml", "-b", "fake", "--expose", "auto", "--set",
+                                       "integrator.type=normals", expect=2), "integrator.type path")
+        self.assert_one_error(self.crt("lit.yaml", "-b", "fake", "--expose", "more", expect=2), "auto")
+
+    def bytes(self, name):
+        return harness.read_bytes(self.path(name))
+
+
+class Units(LightTest):
+    def render(self, text, *options):
+        self.write("bulb.yaml", text)
+        run = self.crt("bulb.yaml", "-b", self.backend, "--spp", "4096", "-o", "a.pfm", "-o", "a.png",
+                       "--set", "film.color_space=xyz", *options)
+        return read_pfm(self.path("a.pfm"))[2][1], run.stderr
+
+    def test_a_bulb_in_millimetres_is_as_bright_as_in_metres(self):
+        in_metres, said = self.render(BULB.format(1, 2))
+        self.assertAlmostEqual(in_metres / BULB_Y, 1, delta=1e-3)
+        self.assertNotIn("unit: mm", said)
+        in_millimetres, said = self.render("crt: 1\nunit: mm\n" + BULB.format(1000, 2000)[7:])
+        self.assertAlmostEqual(in_millimetres / in_metres, 1, delta=1e-5)
+        self.assertNotIn("unit: mm", said)
+
+    def test_a_black_picture_names_the_unit(self):
+        dark, said = self.render(BULB.format(1000, 2000))
+        self.assertAlmostEqual(dark / BULB_Y, 1e-6, delta=1e-8)
+        self.assertIn("a scene unit counts as a metre", said)
+        self.assertIn("write 'unit: mm'", said)
+        # Not where the scene says that it is as large as that.
+        self.assertNotIn("unit: mm", self.render(BULB.format(1000, 2000), "--set", "unit=m")[1])
+        self.assertNotIn("unit: mm", self.render(BULB.format(1000, 2000), "--set", "film.exposure_ev=25")[1])
+
+    def test_radians_make_a_black_picture(self):
+        self.write("narrow.yaml", SCENE.replace("fov: 40", "fov: 0.7").replace("target: [0, 0.5, 0]",
+                                                                            "target: [0, 9, 0]"))
+        run = self.crt("narrow.yaml", "-b", self.backend, "-o", "a.pfm")
+        self.assertIn("'fov' is in degrees, and the camera sees 0.7 of them", run.stderr)
+
+
+class OtherRenderers(CliTest):
+    """With a Python that writes down how it is called: the package is tested in python/tests."""
+
+    def setUp(self):
+        super().setUp()
+        self.write("other.xml", "<scene/>")
+
+    def python(self, looks):
+        """Whose first call, which looks for the package, ends with this code."""
+        path = self.path("python")
+        with open(path, "w", encoding="utf-8") as file:
+            file.write(f'#!/bin/sh\nif [ $# = 2 ]; then exit {looks}; fi\n'
+                       'shift 2\nprintf "%s\\n" "$CRT_PROGRAM" "$@"\nexit 3\n')
+        os.chmod(path, os.stat(path).st_mode | stat.S_IXUSR)
+        return path
+
+    def test_the_package_gets_the_command_line(self):
+        python = self.python(looks=0)
+        for command in ([], ["render"], ["view"], ["info"]):
+            words = [*command, "other.xml", "--set", "film.resolution=[8, 8]"]
+            run = self.crt(*words, expect=3, CRT_PYTHON=python)
+            implied = [] if command else ["render"]
+            self.assertEqual(run.stdout.splitlines(), [os.path.realpath(harness.CRT), *implied, *words])
+        run = self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", CRT_PYTHON=python)
+        self.assertEqual(run.stdout, "")
+        # A command line that is wrong is told before.
+        self.assertEqual(self.crt("other.xml", "--ssp", "3", expect=2, CRT_PYTHON=python).stdout, "")
+
+    def test_without_the_package_there_is_a_hint(self):
+        for python in ("", self.python(looks=1), "/nowhere/python"):
+            run = self.crt("other.xml", expect=3, CRT_PYTHON=python)
+            self.assert_one_error(run, "a scene of Mitsuba", "python3 -m crt import other.xml")
+
+    def test_what_lies_in_the_working_directory_is_not_run(self):
+        os.makedirs(self.path("crt/importers"))
+        for name in ("crt/__init__.py", "crt/__main__.py", "importlib.py"):
+            self.write(name, "open('ran', 'w').close()\n")
+        self.crt("other.xml", expect=3, CRT_PYTHON="python3", PYTHONPATH=None)
+        self.assertFalse(os.path.exists(self.path("ran")))
+
+
+if __name__ == "__main__":
+    harness.main(__doc__)
