@@ -29,6 +29,7 @@ import zlib
 
 import harness
 import hostile_models
+import hostile_work
 
 SECONDS = 10            # Of processor time; longer is a hang.
 WAIT_SECONDS = 600      # In all: waiting for a pipe takes no processor time. Only ends hangs.
@@ -792,6 +793,7 @@ def model_cases():
         lambda name: HEAD + MATERIALS + f"objects: [{{ply: '{name}', material: m}}]\n",
         endless_files,
     )
+    hostile_work.model_cases(case)
 
 
 def spectrum_cases():
@@ -835,6 +837,7 @@ def spectrum_cases():
                   f"clamp}}}}}}\nobjects: [{{{TRIANGLE}, material: m}}]\n",
             )
         case("spectrum", f"{name} in place of a spectrum", ["info", "scene.yaml"], 3, (), prepare)
+    hostile_work.spectrum_cases(case)
 
 
 # -----------------------------------------------------------------------------------------------------------
@@ -890,6 +893,7 @@ def texture_cases(samples):
     )
     texture("a JPEG without a height", "a.jpg", jpeg[:frame] + b"\0\0" + jpeg[frame + 2:], "a.jpg")
     hostile_models.tga_cases(texture)
+    hostile_work.texture_cases(texture, png)
     for name in ("folder", "pipe", "/dev/zero", "noise", "sparse"):
         def prepare(folder, name=name):
             endless_files(folder)
@@ -1097,6 +1101,7 @@ def argument_cases(samples):
     def words_of(asked, arguments, codes=2, words=(), **options):
         case("arguments", asked, arguments, codes, words, good, **options)
 
+    hostile_work.argument_cases(words_of)
     words_of("nothing", [])
     words_of("an option that is none", ["--nonsense"])
     words_of("an empty word", [""], (2, 3))
@@ -1234,6 +1239,15 @@ def environment_cases():
     with_variable("HOME=/nonexistent", 0, CRT_CACHE_DIR=None, HOME="/nonexistent/deep", XDG_CACHE_HOME=None)
     with_variable("LANG=xx_YY.nonsense", 0, LANG="xx_YY.nonsense", LC_ALL="xx_YY.nonsense")
     with_variable("TERM=nonsense", 0, TERM="nonsense")
+    def rough_glass(folder):
+        folder.write(
+            "scene.yaml",
+            HEAD
+            + "materials: {m: {type: rough_dielectric, ior: 1.5, roughness: 0.3}}\n"
+            + f"objects: [{{{TRIANGLE}, material: m, {LIT}}}]\n",
+        )
+
+    hostile_work.environment_cases(with_variable, rough_glass)
     with_variable("CRT_SCENE_MEMORY=lots", 2, "CRT_SCENE_MEMORY", CRT_SCENE_MEMORY="lots")
     with_variable("CRT_SCENE_MEMORY=-1GB", 2, "CRT_SCENE_MEMORY", CRT_SCENE_MEMORY="-1GB")
     with_variable("CRT_BACKEND=nonsense", 4, arguments=["scene.yaml", "-o", "a.pfm"], CRT_BACKEND="nonsense")
@@ -2013,6 +2027,9 @@ def main():
     try:
         samples = make_samples()
         scene_cases()
+        hostile_work.material_cases(case)
+        hostile_work.light_cases(case)
+        hostile_work.name_cases(case, good, os.path.join(FAKE, "crt_backend_fake.so"))
         mesh_cases()
         model_cases()
         spectrum_cases()
