@@ -1,6 +1,7 @@
 #include "compile/environment_image.h"
 
 #include "base/error.h"
+#include "base/log.h"
 #include "base/parallel.h"
 #include "compile/distributions.h"
 #include "image/texels.h"
@@ -80,6 +81,8 @@ EnvironmentTexels texelsOf(const EnvironmentImage& image) {
         const TexelsInfo info = texelsInfo(image.file);
         checkShape(image, info);
         checkSize(image, info);
+        for (const std::string& sentence : sentencesOf(info.tags, image.file, true))
+            logWarning("{}", sentence);
         out.width = info.width;
         out.height = info.height;
         rgb = linearRgb(readTexels(image.file), TexelColor::Auto, image.file);
