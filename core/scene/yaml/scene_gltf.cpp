@@ -30,7 +30,7 @@ void ObjectReader::tellGltf() const {
                    lost.primitives);
 }
 
-/// Nothing where it is wrong, which is told, and where nothing of it can be seen, which is warned of.
+/// Nothing where it is wrong, which is told.
 std::optional<std::uint32_t> ObjectReader::readGltf(const SectionReader& object) {
     const std::optional<SectionReader> form =
         object.section("gltf", fmt::format("the gltf of {}", object.subject()));
@@ -52,10 +52,6 @@ std::optional<std::uint32_t> ObjectReader::readGltf(const SectionReader& object)
     if (!fresh) return known->second;
     try {
         Mesh mesh = gltfMesh(*form, *path, which);
-        if (mesh.triangles.empty()) {
-            logWarning("{} is left out: no triangle of it has an area", object.subject());
-            return std::nullopt;
-        }
         setNormals(mesh, normals, object.subject());
         known->second = static_cast<std::uint32_t>(scene_.meshes.size());
         scene_.meshes.push_back(std::move(mesh));
