@@ -510,6 +510,43 @@ TEST_CASE("a texture of an EXR with alpha has the colours before they were multi
     CHECK(distance(probe.color(0.5, 0.5), {0.5, 0.25, 0.125}) < 2e-3);
 }
 
+TEST_CASE("opacities of vertices, linear in between or by a threshold", "[texture][gltf]") {
+    const crt::TemporaryFolder folder;
+    crt::test::GltfMaker maker = crt::test::squareFile();
+    std::vector<float> colors;
+    for (const float alpha : {0.2f, 0.6f, 1.0f, 0.4f}) colors.insert(colors.end(), {1, 1, 1, alpha});
+    maker.root["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = maker.floats("VEC4", 4, colors);
+    folder.write("a.glb", maker.glb());
+    const auto with = [](const std::string& more, const std::string& opacity = ", vertex_opacity: true") {
+        return "crt: 1\nmaterials: {it: {type: diffuse, reflectance: 0.5, opacity: {attribute: opacity" +
+               more + "}}}\nobjects: [{gltf: {file: a.glb, mesh: 0" + opacity + "}, material: it}]\n";
+    };
+    // In the first triangle, of the vertices 0, 1 and 2.
+    const auto opacity = [&](const std::string& more, double b1, double b2) {
+        const Probe probe(with(more), folder.path());
+        return probe.opacity(probe.hit(probe.slotOf(0), b1, b2));
+    };
+    for (const auto& [b1, b2] : {std::pair{0.0, 0.0}, {1.0, 0.0}, {0.0, 1.0}, {0.5, 0.5}, {0.25, 0.5}}) {
+        const double alpha = 0.2 * (1 - b1 - b2) + 0.6 * b1 + b2;
+        INFO(alpha);
+        CHECK(opacity("", b1, b2) == Approx(alpha).margin(1e-4));
+        CHECK(opacity(", factor: 0.5", b1, b2) == Approx(alpha / 2).margin(1e-4));
+        CHECK(opacity(", cutoff: 0.6", b1, b2) == (alpha >= 0.6 ? 1 : 0));
+        CHECK(opacity(", cutoff: 0.61, factor: 0.5", b1, b2) ==
+              Approx(alpha >= 0.61 ? 0.5 : 0).margin(1e-4));
+    }
+    const std::string& in = folder.path();
+    CHECK_THAT(refusal(with("", ""), in), Contains("opacity of vertices") && Contains("vertex_opacity"));
+    CHECK_THAT(refusal(squareWith("{attribute: opacity}"), in),
+               Contains("opacities of vertices are numbers"));
+    CHECK_THAT(refusal(squareWith("{attribute: colors, cutoff: 0.5}", ""), in), Contains("about opacities"));
+    write(in + "/a.png", crt::OutputFormat::Png, noise(4, 4, 3));
+    CHECK_THAT(refusal("crt: 1\nmaterials: {it: {type: diffuse, reflectance: {texture: a.png}}}\nobjects: "
+                       "[{gltf: {file: a.glb, mesh: 0, vertex_opacity: true}, material: it}]\n",
+                       in),
+               Contains("opacities in place of texture coordinates"));
+}
+
 TEST_CASE("what an image says and crt ignores is told once for all textures of it", "[texture]") {
     const crt::TemporaryFolder folder;
     crt::spit(folder / "a.hdr",

@@ -46,6 +46,7 @@ std::optional<std::uint32_t> ObjectReader::readGltf(const SectionReader& object)
     if (form->read("uv_set", number)) which.uv_set = number;
     if (std::vector<double> factor; form->read("color_factor", factor))
         which.color_factor = {factor[0], factor[1], factor[2]};
+    form->read("vertex_opacity", which.opacity);
     const std::optional<std::string> path = files_.locate(name, form->place("file"), out_);
     if (!path) return std::nullopt;
     const auto [known, fresh] = gltf_meshes_.try_emplace({*path, which, normals});
