@@ -2,10 +2,11 @@
 // and checks that none spills more than a few registers. Needs no GPU. Prints registers and compile time of
 // each variant.
 //
-//     nvrtc_variants [--arch 90] [--only] [SCENE.yaml …]
+//     nvrtc_variants [--arch 90] [--part I N] [--only] [SCENE.yaml …]
 //
 // The masks: everything, each sampler and accelerator, each kind of material, and those of the scenes given,
-// as a render of the file compiles them. --only: those of the scenes that follow, alone.
+// as a render of the file compiles them. --only: those of the scenes that follow, alone. --part: every
+// N-th variant, from the I-th on.
 // Exit code 77, which ctest shows as skipped, where NVRTC is missing.
 #include "cuda_nvrtc.h"
 #include "cuda_program.h"
@@ -16,6 +17,7 @@
 #include "base/error.h"
 #include "compile/compile.h"
 #include "kernel/features.h"
+#include "kernel/layout.h"
 #include "render/outputs.h"
 #include "scene/yaml/scene_yaml.h"
 
@@ -98,7 +100,7 @@ void add(const KernelSpec& kernel, const std::string& name, Variants& variants) 
 }
 
 void addMask(std::uint64_t mask, const std::string& name, Variants& variants) {
-    if (!crt::wantsWavefront(mask)) return add({Entry::Render, mask}, name, variants);
+    if (!crt::wantsWavefront(mask, 0)) return add({Entry::Render, mask}, name, variants);
     add({Entry::Trace, mask}, name, variants);
     const std::uint64_t kinds = mask & CRT_FEATURES_MATERIALS;
     for (std::uint64_t kind = 1; kind <= kinds; kind <<= 1)
@@ -106,7 +108,9 @@ void addMask(std::uint64_t mask, const std::string& name, Variants& variants) {
 }
 
 void addScene(const crt::CompiledScene& scene, const std::string& name, Variants& variants) {
-    if (!crt::wantsWavefront(scene.features)) return add({Entry::Render, scene.features}, name, variants);
+    const auto* const header = reinterpret_cast<const CrtScene*>(scene.data());
+    if (!crt::wantsWavefront(scene.features, header->max_depth))
+        return add({Entry::Render, scene.features}, name, variants);
     for (const KernelSpec& kernel : crt::plugin::planWave(scene.data()).kernels) add(kernel, name, variants);
 }
 

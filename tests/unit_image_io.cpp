@@ -3,18 +3,19 @@
 // Over 450 lines: one list of formats, and what each has to keep and to refuse.
 #include "base/error.h"
 #include "base/log.h"
-#include "catch.h"
-#include "image/image_io.h"
 #include "base/temporary_folder.h"
+#include "catch.h"
 #include "file_bytes.h"
+#include "image/image_io.h"
+#include "png_file.h"
 
+#include <sys/stat.h>
+#include <unistd.h>
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <limits>
-#include <sys/stat.h>
-#include <unistd.h>
 
 using namespace crt;
 using crt::TemporaryFolder;
@@ -335,6 +336,10 @@ TEST_CASE("files of other formats and headers beyond the file's size are refused
     spit(path, "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 65535 +X 65535\n12345678");
     CHECK_THROWS_WITH(readImage(path),
                       Contains("65535 x 65535") && Contains("more than a file of its size can hold"));
+    // A PNG of which no compression makes so few bytes.
+    spit(path, pngOf({.width = 20000, .height = 20000, .bits = 8, .color = 0}, std::string(300, 'x')));
+    CHECK_THROWS_WITH(readImage(path),
+                      Contains("20000 x 20000 pixels, more than a file of its size can hold"));
 
     // One row that is so long that OpenImageIO, which reads rows by 64, would allocate 4 GiB; and one that
     // is not.

@@ -1,16 +1,9 @@
 // What `crt import` makes of a model: the scene reads back as the model itself does, and materials,
 // textures, lights and cameras are what the formats say.
-#include "gltf_file_maker.h"
-#include "png_file.h"
+#include "imported.h"
 
-#include "base/error.h"
-#include "base/temporary_folder.h"
-#include "captured_log.h"
-#include "compile/compile.h"
-#include "scene/import/import.h"
 #include "scene/import/scene_text.h"
 #include "scene/light_units.h"
-#include "scene/yaml/scene_yaml.h"
 
 #include <fmt/format.h>
 
@@ -21,58 +14,6 @@
 
 using namespace crt;
 using namespace crt::test;
-
-namespace {
-
-/// 8 bits, four channels, without filters' help.
-std::string rgba(unsigned width, unsigned height, const std::vector<std::uint8_t>& codes) {
-    const PngKind kind{.width = width, .height = height, .color = 6};
-    return pngOf(kind, zlibStream(filteredRows(kind, bytesOf(codes))));
-}
-
-/// The text of the import, and the scene that it is; the log is what was said.
-struct Imported {
-    std::string text, log;
-    Scene scene;
-};
-
-Imported importOf(const GltfMaker& maker) {
-    const TemporaryFolder folder;
-    const CapturedLog log;
-    const std::string path = folder.write("a.glb", maker.glb());
-    GltfFiles files;
-    Imported result;
-    result.text = importModel(files, path).scene;
-    try {
-        result.scene = loadScene(path);
-    } catch (const Error& e) {
-        FAIL(result.text << "\n" << e.what());
-    }
-    // What its textures are is seen when they are decoded.
-    (void)compileScene(result.scene, 0);
-    result.log = log.text();
-    return result;
-}
-
-/// A square with this material.
-Imported importOf(const Json& material, const std::function<void(GltfMaker&)>& more = {}) {
-    GltfMaker maker = squareFile();
-    maker.add("materials", material);
-    maker.root["meshes"][0]["primitives"][0]["material"] = 0;
-    if (more) more(maker);
-    return importOf(maker);
-}
-
-const std::vector<std::uint8_t> kFourTexels{255, 0,   0, 255, 0,  128, 255, 128,
-                                            10,  200, 0, 0,   90, 60,  255, 64};
-
-std::vector<std::uint16_t> wordsOf(const Texture& texture) {
-    std::vector<std::uint16_t> words(texture.image->words());
-    texture.image->decode(words);
-    return words;
-}
-
-}  // namespace
 
 // Fails when the text in memory is another than that of `crt import`, or refers to other files.
 TEST_CASE("A model and the scene that is imported of it compile to equal bytes", "[gltf][import]") {
@@ -240,44 +181,6 @@ TEST_CASE("Extensions of materials become keys of OpenPBR", "[gltf][import]") {
         Contains("emission: {radiance: {rgb: [1, 0.5, 0], space: linear, scale: 2}, two_sided: true}"));
     CHECK_THAT(textOf("KHR_materials_unlit", Json::object()),
                Contains("reflectance: 0\n") && Contains("scale: 1}, two_sided: true}"));
-}
-
-// Fails when metals are taken for dielectrics, what is mirrored is not taken off the diffuse colour, alpha
-// is not the glossiness, or the extension wins over what the file says better.
-TEST_CASE("Specular and glossiness become a metal or a dielectric", "[gltf][import]") {
-    const auto textOf = [](const Json& value, bool textured = false, Json material = Json::object()) {
-        material["extensions"]["KHR_materials_pbrSpecularGlossiness"] = value;
-        const Imported result = importOf(material, [&](GltfMaker& maker) {
-            maker.root["extensionsUsed"] =
-                maker.root["extensionsRequired"] = {"KHR_materials_pbrSpecularGlossiness"};
-            if (textured) maker.texture(rgba(2, 2, kFourTexels));
-        });
-        return result.text + result.log;
-    };
-    const Json plastic{{"diffuseFactor", {0.5, 0.25, 0.125, 1}},
-                       {"specularFactor", {0.25, 0.25, 0.25}},
-                       {"glossinessFactor", 0.75}};
-    CHECK_THAT(textOf(plastic), Contains("base_color: {rgb: [0.375, 0.1875, 0.09375], space: linear}\n    "
-                                         "specular_roughness: 0.25\n    specular_ior: 3\n"));
-    const Json gold{{"diffuseFactor", {0, 0, 0, 1}}, {"specularFactor", {1, 0.5, 0.25}}};
-    CHECK_THAT(textOf(gold), Contains("base_color: {rgb: [1, 0.5, 0.25], space: linear}\n    "
-                                      "base_metalness: 1\n    specular_roughness: 0\n"));
-    const Json by_texture{{"diffuseFactor", {0, 0, 0, 1}}, {"specularGlossinessTexture", {{"index", 0}}}};
-    CHECK_THAT(textOf(by_texture, true),
-               Contains("base_color: {texture: a.glb, image: 0}\n    base_metalness: 1\n    "
-                        "specular_roughness: " +
-                        yamlNumber(1 - (255 + 128 + 64) / 4.0 / 255)) &&
-                   Contains("glossiness by a texture: its mean"));
-    const Json painted{{"diffuseTexture", {{"index", 0}}}, {"specularFactor", {0, 0, 0}}};
-    CHECK_THAT(textOf(painted, true),
-               Contains("base_color: {texture: a.glb, image: 0}\n") && Contains("specular_ior: 1\n"));
-    const Json both{
-        {"pbrMetallicRoughness",
-         {{"baseColorTexture", {{"index", 0}}}, {"metallicFactor", 0}, {"roughnessFactor", 0.5}}}};
-    CHECK_THAT(textOf(gold, true, both),
-               Contains("base_color: {texture: a.glb, image: 0}\n    specular_roughness: 0.5\n"));
-    CHECK_THAT(textOf({{"diffuseFactor", "red"}, {"specularFactor", {1}}, {"glossinessFactor", {}}}),
-               Contains("base_metalness: 1\n"));
 }
 
 // Found by the fuzzer: a factor of 3e38 became a scene that crt itself refuses.

@@ -1,7 +1,10 @@
 // Scene YAML: meshes, placements, and the materials that an OBJ brings.
+#include "gltf_file_maker.h"
 #include "scene_texts.h"
 
 #include "base/temporary_folder.h"
+#include "captured_log.h"
+#include "compile/compile.h"
 
 #include <cmath>
 #include <fstream>
@@ -27,6 +30,42 @@ TEST_CASE("triangles without area are left out with a warning", "[scene_yaml]") 
         parse(meshScene("mesh: {positions: [[0,0,0],[1,0,0],[0,1,0],[2,0,0]], faces: [[0,1,2],[0,1,3]]}"));
     CHECK(scene.meshes[0].triangles.size() == 1);
     CHECK(warningCount() == before + 1);
+}
+
+// Wherever the mesh comes from, and whatever else is asked of it.
+TEST_CASE("an object whose mesh has no face of an area is left out with a warning", "[scene_yaml]") {
+    const TemporaryFolder folder;
+    folder.write("flat.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n");
+    folder.write("lamp.obj", "mtllib lamp.mtl\nv 0 0 0\nv 1 0 0\nv 2 0 0\nusemtl lamp\nf 1 2 3\n");
+    folder.write("lamp.mtl", "newmtl lamp\nKd 0 0 0\nKe 1 1 1\n");
+    folder.write(
+        "flat.ply",
+        "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float "
+        "z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n2 0 "
+        "0\n3 0 1 2\n");
+    GltfMaker maker;
+    const int points = maker.points({0, 0, 0, 1, 0, 0, 2, 0, 0});
+    maker.node({{"mesh", maker.mesh({{"attributes", {{"POSITION", points}}}})}});
+    folder.write("flat.glb", maker.glb());
+    for (const std::string mesh :
+         {"obj: flat.obj, material: grey", "obj: lamp.obj", "obj: flat.obj, material: grey, normals: smooth",
+          "ply: flat.ply, material: grey", "ply: flat.ply, material: grey, normals: smooth",
+          "gltf: {file: flat.glb, mesh: 0}, material: grey",
+          "mesh: {positions: [[0,0,0],[1,0,0],[2,0,0]], faces: [[0,1,2]]}, material: grey"})
+        for (const std::string emission : {"", ", emission: {radiance: 1}"}) {
+            INFO(mesh << emission);
+            const CapturedLog log;
+            const Scene scene = parseScene("crt: 1\n" + kGrey + "objects: [{name: gone, " + mesh + emission +
+                                               "}, {name: also, " + mesh + emission +
+                                               "}, {mesh: " + kTriangle + ", material: grey}]",
+                                           "scene.yaml", folder.path());
+            REQUIRE(scene.objects.size() == 1);
+            CHECK(scene.objects[0].name == "object 2");
+            CHECK_THAT(log.text(), Contains("object 'gone' is left out") && Contains("object 'also' is") &&
+                                       Contains("no face of its mesh has an area"));
+            CHECK((log.text().find("and its light with it") != std::string::npos) == !emission.empty());
+            (void)compileScene(scene, 0);
+        }
 }
 
 TEST_CASE("placements multiply in the order they are written", "[scene_yaml]") {

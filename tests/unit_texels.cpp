@@ -3,12 +3,14 @@
 #include "base/error.h"
 #include "base/temporary_folder.h"
 #include "catch.h"
+#include "file_bytes.h"
 #include "image/image_io.h"
 #include "image/texels.h"
-#include "file_bytes.h"
 #include "jpeg_file.h"
+#include "png_file.h"
 #include "spectra/spectra.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <filesystem>
@@ -226,6 +228,87 @@ TEST_CASE("images that cannot be values say why", "[texels]") {
     named.pixels.resize(24, 0.25f);
     writeImage(path, OutputFormat::Exr, named);
     CHECK(readTexels(path).info.channels == 3);
+}
+
+// What the pixels need counts, not how well they are compressed.
+TEST_CASE("an image of one colour is read, however small its file is", "[texels]") {
+    const TemporaryFolder folder;
+    const std::string path = folder.path() + "/a.png";
+    const PngKind kind{.width = 2048, .height = 2048, .bits = 1, .color = 3};
+    spit(path, pngOf(kind, zlibStream(std::string(2048 * (1 + 2048 / 8), '\0')),
+                     pngChunk("PLTE", std::string("\xff\x80\x40", 3))));
+    REQUIRE(std::filesystem::file_size(path) < 700);
+    const Texels texels = readTexels(path);
+    CHECK(texels.info.count() == 2048 * 2048);
+    CHECK(texels.bytes.size() == 3 * texels.info.count());
+    CHECK(texels.bytes[texels.bytes.size() - 2] == 0x80);
+    CHECK(readImage(path).width == 2048);
+}
+
+TEST_CASE("what a file says of its pixels and crt does not apply is told", "[texels]") {
+    const TemporaryFolder folder;
+    const std::string png = folder.path() + "/a.png", jpeg = folder.path() + "/a.jpg";
+    const PngKind kind{.width = 1, .height = 1, .bits = 8, .color = 2};
+    const std::string stream = zlibStream(std::string("\0abc", 4)), srgb = pngChunk("sRGB", {'\0'});
+    const auto toldOf = [](const std::string& path, bool encoded) {
+        std::string all;
+        for (const std::string& sentence : sentencesOf(texelsInfo(path).tags, path, encoded))
+            all += sentence;
+        return all;
+    };
+    spit(png, pngOf(kind, stream, pngChunk("gAMA", bigEndian32(100000))));
+    CHECK_THAT(toldOf(png, true), Contains("a.png") && Contains("gamma (gAMA) of 1") && Contains("as sRGB"));
+    CHECK(toldOf(png, false).empty());
+    spit(png, pngOf(kind, stream, pngChunk("gAMA", bigEndian32(45455))));
+    CHECK(toldOf(png, true).empty());
+    spit(png, pngOf(kind, stream, pngChunk("gAMA", bigEndian32(100000)) + srgb));
+    CHECK(toldOf(png, true).empty());
+
+    // One entry: orientation, SHORT, one of them, 6; in both orders of bytes.
+    const std::string little("II*\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0\x06\0\0\0\0\0\0\0", 26),
+        big("MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0", 26);
+    writeJpeg(jpeg, 8, 8, 1, std::vector<std::uint8_t>(64, 77));
+    const std::string plain = slurp(jpeg);
+    CHECK(toldOf(jpeg, true).empty());
+    for (const std::string& exif : {little, big}) {
+        spit(png, pngOf(kind, stream, pngChunk("eXIf", exif)));
+        CHECK_THAT(toldOf(png, false), Contains("EXIF orientation 6"));
+        const std::string data = std::string("Exif\0\0", 6) + exif;
+        std::string marked = plain;
+        marked.insert(2, std::string("\xff\xe1\0", 3) + static_cast<char>(data.size() + 2) + data);
+        spit(jpeg, marked);
+        CHECK_THAT(toldOf(jpeg, false),
+                   Contains("a.jpg") && Contains("EXIF orientation 6") && Contains("turn the pixels"));
+        // Cut anywhere, it says nothing and does no harm.
+        for (std::size_t size = 0; size < exif.size() - 4; ++size) {
+            spit(png, pngOf(kind, stream, pngChunk("eXIf", exif.substr(0, size))));
+            CHECK(toldOf(png, false).empty());
+        }
+    }
+}
+
+TEST_CASE("colours of an EXR are multiplied by its alpha, and divided by it", "[texels]") {
+    const TemporaryFolder folder;
+    const std::string path = folder.path() + "/a.exr";
+    Image image = imageOf({});
+    image.channels = {"R", "G", "B", "A"};
+    for (const float alpha : {1.0f, 0.5f, 0.25f, 0.0f, 0.1f, 1.0f})
+        for (const float value : {0.5f, 0.25f, 1.0f, 1.0f}) image.pixels.push_back(value * alpha);
+    std::fill_n(image.pixels.begin() + 12, 3, 0.125f);  // Light where nothing is.
+    writeImage(path, OutputFormat::Exr, image);
+    Texels texels = readTexels(path);
+    CHECK(texels.info.is_associated);
+    divideByAlpha(texels, readAlpha(path));
+    const std::vector<float> rgb = linearRgb(texels, TexelColor::Auto, path);
+    for (std::size_t i = 0; i < 6; ++i)
+        for (std::size_t k = 0; k < 3; ++k) {
+            INFO(i);
+            CHECK(rgb[3 * i + k] == (i == 3 ? Approx(0.125) : Approx(k == 0 ? 0.5 : k == 1 ? 0.25 : 1)));
+        }
+    image.channels = {"R", "G", "B"};
+    image.pixels.resize(18);
+    writeImage(path, OutputFormat::Exr, image);
+    CHECK_FALSE(readTexels(path).info.is_associated);
 }
 
 TEST_CASE("a JPEG of endless scans is refused", "[texels]") {

@@ -3,6 +3,7 @@
 //
 // Over 450 lines: one scene with a texture, seen by look-ups, files and readers.
 #include "file_bytes.h"
+#include "gltf_file_maker.h"
 #include "kernel_test.h"
 
 #include "base/error.h"
@@ -87,6 +88,10 @@ public:
         const CrtMaterial* materials = CRT_ARRAY(CrtMaterial, context_.blob, context_.scene->materials);
         return crt_value(&context_, materials[0].reflectance, &surface, splat4(static_cast<f32>(position)));
     }
+    double opacity(const CrtSurface& surface) const {
+        return double{
+            V4X(crt_value(&context_, crt_compositions(&context_)[0].opacity, &surface, splat4(0)))};
+    }
     Color color(const CrtSurface& surface) const {
         Color rgb{};
         for (std::size_t i = 0; i < crt::kSpectrumSize; ++i)
@@ -110,6 +115,13 @@ public:
         h.slot = slot;
         h.id = CRT_ARRAY(CrtTriangle, context_.blob, context_.scene->triangles)[slot].id;
         return crt_surface(&context_, h);
+    }
+
+    /// Where a triangle of the scene lies.
+    std::uint32_t slotOf(std::uint32_t id) const {
+        std::uint32_t slot = 0;
+        while (CRT_ARRAY(CrtTriangle, context_.blob, context_.scene->triangles)[slot].id != id) ++slot;
+        return slot;
     }
 
 private:
@@ -487,17 +499,78 @@ TEST_CASE("what is wrong about textures is told with its place", "[texture]") {
     CHECK_THAT(log.text(), Contains("1 numbers outside [0, 1]"));
 }
 
+TEST_CASE("a texture of an EXR with alpha has the colours before they were multiplied", "[texture]") {
+    const crt::TemporaryFolder folder;
+    crt::Image image;
+    image.width = image.height = 1;
+    image.channels = {"R", "G", "B", "A"};
+    image.pixels = {0.375f, 0.1875f, 0.09375f, 0.75f};
+    crt::writeImage(folder / "a.exr", crt::OutputFormat::Exr, image);
+    const Probe probe(squareWith("{texture: a.exr}"), folder.path());
+    CHECK(distance(probe.color(0.5, 0.5), {0.5, 0.25, 0.125}) < 2e-3);
+}
+
+TEST_CASE("opacities of vertices, linear in between or by a threshold", "[texture][gltf]") {
+    const crt::TemporaryFolder folder;
+    crt::test::GltfMaker maker = crt::test::squareFile();
+    std::vector<float> colors;
+    for (const float alpha : {0.2f, 0.6f, 1.0f, 0.4f}) colors.insert(colors.end(), {1, 1, 1, alpha});
+    maker.root["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = maker.floats("VEC4", 4, colors);
+    folder.write("a.glb", maker.glb());
+    const auto with = [](const std::string& more, const std::string& opacity = ", vertex_opacity: true") {
+        return "crt: 1\nmaterials: {it: {type: diffuse, reflectance: 0.5, opacity: {attribute: opacity" +
+               more + "}}}\nobjects: [{gltf: {file: a.glb, mesh: 0" + opacity + "}, material: it}]\n";
+    };
+    // In the first triangle, of the vertices 0, 1 and 2.
+    const auto opacity = [&](const std::string& more, double b1, double b2) {
+        const Probe probe(with(more), folder.path());
+        return probe.opacity(probe.hit(probe.slotOf(0), b1, b2));
+    };
+    for (const auto& [b1, b2] : {std::pair{0.0, 0.0}, {1.0, 0.0}, {0.0, 1.0}, {0.5, 0.5}, {0.25, 0.5}}) {
+        const double alpha = 0.2 * (1 - b1 - b2) + 0.6 * b1 + b2;
+        INFO(alpha);
+        CHECK(opacity("", b1, b2) == Approx(alpha).margin(1e-4));
+        CHECK(opacity(", factor: 0.5", b1, b2) == Approx(alpha / 2).margin(1e-4));
+        CHECK(opacity(", cutoff: 0.6", b1, b2) == (alpha >= 0.6 ? 1 : 0));
+        CHECK(opacity(", cutoff: 0.61, factor: 0.5", b1, b2) ==
+              Approx(alpha >= 0.61 ? 0.5 : 0).margin(1e-4));
+    }
+    const std::string& in = folder.path();
+    CHECK_THAT(refusal(with("", ""), in), Contains("opacity of vertices") && Contains("vertex_opacity"));
+    CHECK_THAT(refusal(squareWith("{attribute: opacity}"), in),
+               Contains("opacities of vertices are numbers"));
+    CHECK_THAT(refusal(squareWith("{attribute: colors, cutoff: 0.5}", ""), in), Contains("about opacities"));
+    write(in + "/a.png", crt::OutputFormat::Png, noise(4, 4, 3));
+    CHECK_THAT(refusal("crt: 1\nmaterials: {it: {type: diffuse, reflectance: {texture: a.png}}}\nobjects: "
+                       "[{gltf: {file: a.glb, mesh: 0, vertex_opacity: true}, material: it}]\n",
+                       in),
+               Contains("opacities in place of texture coordinates"));
+}
+
+TEST_CASE("what an image says and crt ignores is told once for all textures of it", "[texture]") {
+    const crt::TemporaryFolder folder;
+    crt::spit(folder / "a.hdr",
+              std::string("#?RGBE\nFORMAT=32-bit_rle_rgbe\nEXPOSURE=2\n\n-Y 1 +X 1\n") + "\x80\x40\x20\x80");
+    const CapturedLog log;
+    const Probe probe(squareWith("{checker: [{texture: a.hdr}, {texture: a.hdr, factor: 0.5}]}"),
+                      folder.path());
+    CHECK(distance(probe.color(0.5, 0.5), {0.5, 0.25, 0.125}) < 2e-3);
+    CHECK(log.warnings() == 1);
+    CHECK_THAT(log.text(), Contains("EXPOSURE=2"));
+}
+
 TEST_CASE("an OBJ brings texture coordinates, its MTL images", "[texture][obj]") {
     const crt::TemporaryFolder folder;
     const std::string& in = folder.path();
     const Color left{0.7, 0.2, 0.1}, right{0.1, 0.2, 0.7};
     write(in + "/Wood Tiles.exr", crt::OutputFormat::Exr, {2, 1, {left, right}});
-    crt::spit(in + "/a.mtl",
-         "newmtl wood\nKd 0 0 0\nmap_Kd -s 1 1 -clamp on textures\\wood tiles.EXR\nnewmtl gone\nKd 0.5 0.5 "
-         "0.5\nmap_Kd gone.png\nnewmtl broken\nKd 0.25 0.25 0.25\nmap_Kd a.obj\n");
+    crt::spit(
+        in + "/a.mtl",
+        "newmtl wood\nKd 0 0 0\nmap_Kd -s 1 1 -clamp on textures\\wood tiles.EXR\nnewmtl gone\nKd 0.5 0.5 "
+        "0.5\nmap_Kd gone.png\nnewmtl broken\nKd 0.25 0.25 0.25\nmap_Kd a.obj\n");
     crt::spit(in + "/a.obj",
-         "mtllib a.mtl\nv 0 0 0\nv 0 0 1\nv 1 0 1\nv 1 0 0\nvt 0 0\nvt 0 1 0\nvt 1 1\nvt 1\n"
-         "usemtl wood\nf 1/1 2/2 3/3 4/4\nusemtl gone\nf -4/-4 -3/-3 -2/-2\nusemtl broken\nf 1 2 3\n");
+              "mtllib a.mtl\nv 0 0 0\nv 0 0 1\nv 1 0 1\nv 1 0 0\nvt 0 0\nvt 0 1 0\nvt 1 1\nvt 1\n"
+              "usemtl wood\nf 1/1 2/2 3/3 4/4\nusemtl gone\nf -4/-4 -3/-3 -2/-2\nusemtl broken\nf 1 2 3\n");
     const std::string yaml = "crt: 1\nobjects: [{obj: a.obj}]\nenvironment: {radiance: 1}\n";
     const CapturedLog log;
     const Scene scene = sceneOf(yaml, in);

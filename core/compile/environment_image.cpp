@@ -79,7 +79,7 @@ auto readAt(const SourcePlace& place, const Read& read) {
     try {
         return read();
     } catch (const Error& error) {
-        if (error.kind() != ErrorKind::Scene) throw;
+        if (error.kind() != ErrorKind::Scene || error.place().line > 0) throw;
         refuse(place, error.what());
     }
 }
@@ -98,6 +98,7 @@ EnvironmentTexels texelsOf(const EnvironmentImage& image) {
     checkShape(image, info);
     checkSize(image, info);
     warnOfCodes(image, info);
+    for (const std::string& sentence : sentencesOf(info.tags, image.file, true)) logWarning("{}", sentence);
     out.width = info.width;
     out.height = info.height;
     const std::vector<float> rgb = readAt(image.place, [&] {

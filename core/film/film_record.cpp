@@ -144,8 +144,9 @@ SceneTrait geometryTrait(const Scene& scene) {
     Digest digest;
     std::uint64_t triangles = 0, shapes = 0, placements = 0;
     for (const Mesh& mesh : scene.meshes) {
-        const auto& [positions, normals, corners, normal_index, uvs, uv_index, colors, material, emission] =
-            mesh;
+        // What the coordinates are for, textures say.
+        const auto& [positions, normals, corners, normal_index, uvs, uv_index, uvs_are_opacity, colors,
+                     material, emission] = mesh;
         digest.add(positions);
         digest.add(normals);
         digest.add(corners);
@@ -218,7 +219,7 @@ SceneTrait materialsTrait(const Scene& scene) {
 
 /// Of images their names and sizes: their texels are read by compilation alone.
 void addTexture(Digest& digest, const Texture& texture) {
-    const auto& [kind, image, filter, wrap, values, transform, place] = texture;
+    const auto& [kind, image, filter, wrap, values, transform, of_opacity, place] = texture;
     digest.add(kind);
     digest.add(filter);
     digest.add(wrap);
@@ -228,6 +229,7 @@ void addTexture(Digest& digest, const Texture& texture) {
     }
     for (const double number : transform) digest.add(number);
     if (!image) return;
+    if (of_opacity) digest.add(of_opacity);
     digest.add(std::vector<char>(image->file.begin(), image->file.end()));
     for (const std::uint32_t size : {image->width, image->height}) digest.add(size);
     digest.add(image->kind);

@@ -1,11 +1,16 @@
 #include "image/image_headers.h"
 
+#include "image/exif_orientation.h"
+#include "image/memory_bound.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <functional>
+#include <iterator>
 #include <map>
 #include <string_view>
 
@@ -46,6 +51,12 @@ public:
 private:
     std::string_view rest_;
 };
+
+std::uint64_t bigEndianIn(std::string_view bytes, std::size_t at) {
+    std::uint64_t value = 0;
+    for (std::size_t i = 0; i < 4; ++i) value = value << 8 | static_cast<unsigned char>(bytes[at + i]);
+    return value;
+}
 
 /// As much of a file as a header takes.
 std::string beginningOf(const std::string& path) {
@@ -91,6 +102,28 @@ struct Part {
     std::uint64_t width = 0, height = 0, channels = 0;
 };
 
+/// What a byte of Deflate becomes at most: two bits repeat 258 bytes.
+constexpr double kDeflateBytesAByte = 1032;
+
+/// Throws DamagedHeader when pixels of `bytes` do not come out of a file that holds `most_bytes` at most.
+void requireRoom(std::uint64_t width, std::uint64_t height, double bytes, double most_bytes) {
+    if (bytes > most_bytes)
+        throw DamagedHeader(fmt::format(
+            "its header says {} x {} pixels, more than a file of its size can hold", width, height));
+}
+
+/// Of EXR. DWAB makes at best two halves of 64, and Deflate the rest; it takes floats for halves.
+void checkPixels(const std::string& path, std::uint64_t width, std::uint64_t height,
+                 std::uint64_t channels) {
+    constexpr double kLossyBytesAByte = 32 * 2;
+    const double bytes =
+        4.0 * static_cast<double>(width) * static_cast<double>(height) * static_cast<double>(channels);
+    if (bytes == 0) throw DamagedHeader("its header says that it has no pixels");
+    requireRoom(
+        width, height, bytes,
+        kLossyBytesAByte * kDeflateBytesAByte * static_cast<double>(std::filesystem::file_size(path)));
+}
+
 /// The value of an attribute, by "OpenEXR File Layout" (openexr.com). What is not named here is opaque to
 /// OpenEXR, too.
 void checkValue(const std::string& path, const std::string& name, const std::string& type,
@@ -130,6 +163,44 @@ void checkValue(const std::string& path, const std::string& name, const std::str
     }
 }
 
+/// The bytes of a chunk.
+using ReadChunk = std::function<std::string()>;
+using TakeChunk = std::function<void(std::string_view name, std::uint64_t size, const ReadChunk& read)>;
+
+/// By the PNG Specification, 5.3: length (big-endian), name, as many bytes, checksum. Throws DamagedHeader
+/// unless every chunk lies within the file.
+void forEachPngChunk(const std::string& path, const TakeChunk& take) {
+    constexpr std::uint64_t kSignatureBytes = 8, kHeadBytes = 8, kChecksumBytes = 4;
+    std::ifstream file(path, std::ios::binary);
+    const std::uint64_t file_bytes = std::filesystem::file_size(path);
+    std::string name;
+    for (std::uint64_t at = kSignatureBytes; name != "IEND";) {
+        std::string head(kHeadBytes, '\0');
+        file.seekg(static_cast<std::streamoff>(at));
+        if (!file.read(head.data(), kHeadBytes)) throw DamagedHeader("it ends before its last chunk");
+        const std::uint64_t size = bigEndianIn(head, 0);
+        name = head.substr(4);
+        at += kHeadBytes + size + kChecksumBytes;
+        if (at > file_bytes) throw DamagedHeader("one of its chunks goes beyond the end of the file");
+        take(name, size, [&] {
+            std::string bytes(size, '\0');
+            file.read(bytes.data(), static_cast<std::streamsize>(size));
+            return bytes;
+        });
+    }
+}
+
+constexpr std::size_t kPngHeaderBytes = 13;
+
+/// By the PNG Specification, 11.2.2; 0 for a kind of colour that there is not.
+std::uint64_t pngBitsAPixel(const std::string& header) {
+    constexpr unsigned char kSamples[] = {1, 0, 3, 1, 2, 0, 4};
+    const auto color = static_cast<unsigned char>(header[9]);
+    return color < std::size(kSamples)
+               ? kSamples[color] * std::uint64_t{static_cast<unsigned char>(header[8])}
+               : 0;
+}
+
 }  // namespace
 
 void checkExrHeader(const std::string& path) {
@@ -156,34 +227,41 @@ void checkExrHeader(const std::string& path) {
 }
 
 void checkPngHeader(const std::string& path) {
-    // By the PNG Specification, 5.3: length (big-endian), name, as many bytes, checksum.
-    constexpr std::uint64_t kSignatureBytes = 8, kHeadBytes = 8, kChecksumBytes = 4;
-    std::ifstream file(path, std::ios::binary);
-    const std::uint64_t file_bytes = std::filesystem::file_size(path);
-    std::string name;
-    for (std::uint64_t at = kSignatureBytes; name != "IEND";) {
-        unsigned char head[kHeadBytes] = {};
-        file.seekg(static_cast<std::streamoff>(at));
-        if (!file.read(reinterpret_cast<char*>(head), kHeadBytes))
-            throw DamagedHeader("it ends before its last chunk");
-        const std::uint64_t size = std::uint64_t{head[0]} << 24 | head[1] << 16 | head[2] << 8 | head[3];
-        name.assign(reinterpret_cast<const char*>(head) + 4, 4);
-        at += kHeadBytes + size + kChecksumBytes;
-        if (at > file_bytes) throw DamagedHeader("one of its chunks goes beyond the end of the file");
-    }
+    std::uint64_t row_bits = 0, rows = 0, width = 0, deflated = 0;
+    forEachPngChunk(path, [&](std::string_view name, std::uint64_t size, const ReadChunk& read) {
+        if (name == "IHDR") {
+            const std::string header = read();
+            if (header.size() < kPngHeaderBytes) throw DamagedHeader("its header is too short");
+            width = bigEndianIn(header, 0);
+            rows = bigEndianIn(header, 4);
+            row_bits = width * pngBitsAPixel(header);
+        } else if (name == "IDAT") {
+            deflated += size;
+        }
+    });
+    if (width == 0 || rows == 0) throw DamagedHeader("its header says that it has no pixels");
+    requireRoom(width, rows, static_cast<double>(row_bits) / 8 * static_cast<double>(rows),
+                kDeflateBytesAByte * static_cast<double>(deflated));
 }
 
-void checkPixels(const std::string& path, std::uint64_t width, std::uint64_t height,
-                 std::uint64_t channels) {
-    // Deflate, which EXR and PNG use, reaches 1032:1 on bytes; EXR's lossy DWAB some sixty times that on a
-    // constant image.
-    constexpr double kDecodedBytesAByte = 65536;
-    const double decoded_bytes =
-        4.0 * static_cast<double>(width) * static_cast<double>(height) * static_cast<double>(channels);
-    if (decoded_bytes == 0) throw DamagedHeader("its header says that it has no pixels");
-    if (decoded_bytes > kDecodedBytesAByte * static_cast<double>(std::filesystem::file_size(path)))
-        throw DamagedHeader(fmt::format(
-            "its header says {} x {} pixels, more than a file of its size can hold", width, height));
+CrtUnappliedTags tagsOfPng(const std::string& path) {
+    constexpr std::uint64_t kMostExifBytes = 65536;
+    CrtUnappliedTags tags{};
+    bool is_srgb = false;
+    forEachPngChunk(path, [&](std::string_view name, std::uint64_t size, const ReadChunk& read) {
+        if (name == "sRGB") is_srgb = true;
+        if (name == "gAMA" && size == 4) tags.gamma = static_cast<float>(bigEndianIn(read(), 0) / 100000.0);
+        if (name == "eXIf" && size <= kMostExifBytes) tags.orientation = exifOrientation(read());
+    });
+    if (is_srgb) tags.gamma = 0;  // By the PNG Specification, 11.3.3.5, it counts before gAMA.
+    return tags;
+}
+
+void checkMemory(std::uint64_t width, std::uint64_t height, std::uint64_t bytes_a_pixel,
+                 std::uint64_t most_bytes) {
+    if (width == 0 || height == 0) throw DamagedHeader("its header says that it has no pixels");
+    const std::string why = refusalForMemory(width, height, bytes_a_pixel, most_bytes);
+    if (!why.empty()) throw DamagedHeader(why);
 }
 
 void checkRows(std::uint64_t width, std::uint64_t height, std::uint64_t bytes_a_pixel) {

@@ -3,6 +3,8 @@
 /// image module (image_module.h).
 #pragma once
 
+#include "image/image_module.h"
+
 #include <cstdint>
 #include <stdexcept>
 #include <string>
@@ -17,10 +19,13 @@ struct DamagedHeader : std::runtime_error {
 /// Throws DamagedHeader unless attributes have the sizes that their types say and lie within the file, and
 /// its pixels may.
 void checkExrHeader(const std::string& path);
-/// Throws DamagedHeader unless every chunk lies within the file.
+/// Throws DamagedHeader unless every chunk lies within the file, and its pixels may.
 void checkPngHeader(const std::string& path);
-/// Throws DamagedHeader when the file cannot hold as many pixels.
-void checkPixels(const std::string& path, std::uint64_t width, std::uint64_t height, std::uint64_t channels);
+/// What the chunks of a PNG say that checkPngHeader() has checked: gamma and orientation.
+CrtUnappliedTags tagsOfPng(const std::string& path);
+/// Throws DamagedHeader when there are no pixels, or decoded they would take more than `most_bytes`.
+void checkMemory(std::uint64_t width, std::uint64_t height, std::uint64_t bytes_a_pixel,
+                 std::uint64_t most_bytes);
 /// Rows that OpenImageIO reads at a time, into memory for as many however few the image has. (It takes no
 /// fewer; left alone, it takes 256.)
 inline constexpr std::uint64_t kStripRows = 64;

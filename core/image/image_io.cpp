@@ -1,10 +1,13 @@
+// Over 450 lines: one format after the other, each short, and what they share.
 #include "image/image_io.h"
 
 #include "base/error.h"
+#include "base/host.h"
 #include "base/input_file.h"
 #include "image/image_metadata.h"
 #include "image/image_module.h"
 #include "image/open_module.h"
+#include "image/unapplied_tags.h"
 
 #include <fmt/format.h>
 
@@ -250,10 +253,16 @@ Image readWithModule(const std::string& path) {
     const CrtImageModule& module = imageModule(path, ErrorKind::Usage);
     const CrtImagePlanes* planes = nullptr;
     Reason reason{};
-    if (module.read(path.c_str(), &planes, reason.data(), reason.size()) != 0)
+    // Half: the pixels are there twice when the module hands them over.
+    if (module.read(path.c_str(), availableHostMemory() / 2, &planes, reason.data(), reason.size()) != 0)
         refuseToRead(path, reason.data());
     const std::unique_ptr<const CrtImagePlanes, void (*)(const CrtImagePlanes*)> guard(planes,
                                                                                        module.free_image);
+
+    const CrtUnappliedTags& tags = planes->tags;
+    for (const std::string& sentence :
+         sentencesOf({tags.gamma, tags.exposure, tags.orientation}, path, true))
+        logWarning("{}", sentence);
 
     Image image;
     image.width = planes->width;

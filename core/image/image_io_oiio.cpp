@@ -1,12 +1,13 @@
-// The image codec module: EXR, PNG and HDR through OpenImageIO, JPEG through libjpeg-turbo, sound PNG
-// files that are textures through libdeflate, behind image_module.h. Built as a library of its own; nothing
-// else in crt includes OpenImageIO.
+// The image codec module: EXR and PNG through OpenImageIO, JPEG through libjpeg-turbo, sound PNG files that
+// are textures through libdeflate, Radiance HDR and TGA by readers of its own, behind image_module.h. Built
+// as a library of its own; nothing else in crt includes OpenImageIO.
 //
 // Over 450 lines: it is all of the module, and all that knows OpenImageIO.
 #include "image/image_headers.h"
 #include "image/image_module.h"
 #include "image/jpeg_reader.h"
 #include "image/png_reader.h"
+#include "image/radiance_reader.h"
 #include "image/tga_reader.h"
 
 #include <OpenImageIO/filesystem.h>
@@ -21,6 +22,7 @@
 #include <exception>
 #include <fstream>
 #include <memory>
+#include <new>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -69,6 +71,8 @@ std::int32_t guarded(char* reason, std::uint32_t reason_size, Body&& body) noexc
         return 0;
     } catch (const Failure& failure) {
         return say(failure.reason.c_str());
+    } catch (const std::bad_alloc&) {
+        return say("there is not enough memory for its pixels");
     } catch (const std::exception& exception) {
         return say(exception.what());
     } catch (...) {
@@ -269,7 +273,6 @@ struct KnownFormat {
 constexpr KnownFormat kKnownFormats[] = {
     {"openexr", std::string_view("\x76\x2f\x31\x01", 4), crt::image::checkExrHeader},
     {"png", std::string_view("\x89PNG\r\n\x1a\n", 8), crt::image::checkPngHeader},
-    {"hdr", std::string_view("#?RADIANCE", 10)},
 };
 
 /// How a file begins.
@@ -299,6 +302,8 @@ std::unique_ptr<ImageInput> openKnown(const char* path, ImageSpec& spec, const I
     return nullptr;
 }
 
+bool isPng(const ImageInput& input) { return std::strcmp(input.format_name(), "png") == 0; }
+
 std::unique_ptr<ImageInput> openImage(const char* path, ImageSpec& spec) {
     if (std::unique_ptr<ImageInput> input = openKnown(path, spec, ImageSpec())) return input;
     throw Failure{
@@ -306,15 +311,53 @@ std::unique_ptr<ImageInput> openImage(const char* path, ImageSpec& spec) {
         "oiiotool IN -o OUT.exr"};
 }
 
-std::int32_t readImage(const char* path, const CrtImagePlanes** image, char* reason,
-                       std::uint32_t reason_size) {
+/// CIE XYZ as primaries.
+constexpr std::array<float, 8> kXyzPrimaries{1, 0, 0, 1, 0, 0, 1.0f / 3, 1.0f / 3};
+
+crt::image::RadianceHeader radianceHeader(const char* path) {
+    crt::image::RadianceHeader header;
+    const std::string why = crt::image::readRadiance(path, &header, nullptr, 0);
+    if (!why.empty()) throw Failure{why};
+    return header;
+}
+
+std::unique_ptr<OwnedImage> readRadianceImage(const char* path, std::uint64_t most_bytes) {
+    crt::image::RadianceHeader header = radianceHeader(path);
+    crt::image::checkMemory(header.width, header.height, 3 * sizeof(float), most_bytes);
+    auto owned = std::make_unique<OwnedImage>();
+    owned->float_values.resize(std::size_t{header.width} * header.height * 3);
+    const std::string why =
+        crt::image::readRadiance(path, &header, owned->float_values.data(), owned->float_values.size());
+    if (!why.empty()) throw Failure{why};
+    owned->float_names = {"R", "G", "B"};
+    for (const std::string& name : owned->float_names) owned->float_pointers.push_back(name.c_str());
+    owned->width = owned->whole_width = header.width;
+    owned->height = owned->whole_height = header.height;
+    owned->float_channel_count = 3;
+    owned->float_channels = owned->float_pointers.data();
+    owned->floats = owned->float_values.data();
+    if (header.is_xyz) {
+        owned->primaries = kXyzPrimaries;
+        owned->chromaticities = owned->primaries.data();
+    }
+    owned->tags.exposure = static_cast<float>(header.exposure);
+    return owned;
+}
+
+std::int32_t readImage(const char* path, std::uint64_t most_bytes, const CrtImagePlanes** image,
+                       char* reason, std::uint32_t reason_size) {
     return guarded(reason, reason_size, [&] {
+        if (crt::image::beginsAsRadiance(path)) {
+            *image = readRadianceImage(path, most_bytes).release();
+            return;
+        }
         ImageSpec spec;
         const std::unique_ptr<ImageInput> input = openImage(path, spec);
         const auto width = static_cast<std::uint64_t>(std::max(spec.width, 0)),
                    height = static_cast<std::uint64_t>(std::max(spec.height, 0));
-        crt::image::checkPixels(path, width, height,
-                                static_cast<std::uint64_t>(std::max(spec.nchannels, 0)));
+        crt::image::checkMemory(width, height,
+                                static_cast<std::uint64_t>(std::max(spec.nchannels, 0)) * sizeof(float),
+                                most_bytes);
         crt::image::checkRows(width, height, spec.pixel_bytes(true));
 
         auto owned = std::make_unique<OwnedImage>();
@@ -383,6 +426,7 @@ std::int32_t readImage(const char* path, const CrtImagePlanes** image, char* rea
         view.integers = owned->integer_values.data();
         view.metadata = owned->texts.data();
         view.metadata_count = static_cast<std::uint32_t>(owned->texts.size());
+        if (isPng(*input)) view.tags = crt::image::tagsOfPng(path);
         view.srgb_encoded =
             spec.format.basetype == TypeDesc::UINT8 || spec.format.basetype == TypeDesc::UINT16;
         *image = owned.release();
@@ -454,84 +498,109 @@ std::vector<int> channelsOf(const ImageSpec& spec, Part part) {
     return spec.alpha_channel >= 0 ? std::vector<int>{spec.alpha_channel} : std::vector<int>{};
 }
 
-std::int32_t readPart(Part part, const char* path, CrtTexelsInfo* info, void* buffer,
-                      std::uint64_t buffer_bytes, char* reason, std::uint32_t reason_size) {
+/// The caller's buffer.
+struct Target {
+    unsigned char* data;  ///< Null: the header alone is asked for.
+    std::uint64_t bytes;
+};
+
+/// Throws Failure with what a reader says, unless that is nothing.
+void require(const std::string& why) {
+    if (!why.empty()) throw Failure{why};
+}
+
+void readJpegPart(Part part, const char* path, CrtTexelsInfo& info, const Target& to) {
+    require(crt::image::readJpeg(path, &info, part == Part::Color ? to.data : nullptr, to.bytes));
+    if (part == Part::Alpha) info.channels = 0;
+}
+
+void readTgaPart(Part part, const char* path, CrtTexelsInfo& info, const Target& to) {
+    if (!crt::image::beginsAsTga(path))
+        throw Failure{"it is no PNG, JPEG, TGA, EXR, Radiance HDR or PFM file"};
+    const auto tga_part = part == Part::Color ? crt::image::TgaPart::Color : crt::image::TgaPart::Alpha;
+    require(crt::image::readTga(path, tga_part, &info, to.data, to.bytes));
+}
+
+void readRadiancePart(Part part, const char* path, CrtTexelsInfo& info, const Target& to) {
+    crt::image::RadianceHeader header = radianceHeader(path);
+    info.width = header.width;
+    info.height = header.height;
+    info.channels = part == Part::Color ? 3 : 0;
+    info.type = CRT_TEXELS_FLOAT;
+    info.has_chromaticities = header.is_xyz;
+    if (header.is_xyz) std::copy(kXyzPrimaries.begin(), kXyzPrimaries.end(), info.chromaticities);
+    info.tags.exposure = static_cast<float>(header.exposure);
+    if (to.data != nullptr && part == Part::Color)
+        require(crt::image::readRadiance(path, &header, reinterpret_cast<float*>(to.data),
+                                         to.bytes / sizeof(float)));
+}
+
+/// EXR and PNG.
+void readPartOf(ImageInput& input, const ImageSpec& spec, Part part, const char* path, CrtTexelsInfo& info,
+                const Target& to) {
+    const auto width = static_cast<std::uint64_t>(std::max(spec.width, 0)),
+               height = static_cast<std::uint64_t>(std::max(spec.height, 0));
+    crt::image::checkRows(width, height, spec.pixel_bytes(true));
+    const Placement placement(spec);
+    const std::vector<int> channels = channelsOf(spec, part);
+    info.width = static_cast<std::uint32_t>(placement.width);
+    info.height = static_cast<std::uint32_t>(placement.height);
+    info.channels = static_cast<std::uint32_t>(channels.size());
+    info.type = texelType(spec);
+    info.has_chromaticities =
+        spec.getattribute("chromaticities", TypeDesc(TypeDesc::FLOAT, 8), info.chromaticities);
+    if (isPng(input)) info.tags = crt::image::tagsOfPng(path);
+    // OpenEXR, "Technical Introduction": colours are multiplied by alpha.
+    info.is_associated = !isPng(input) && spec.alpha_channel >= 0;
+    const TypeDesc type = info.type == CRT_TEXELS_UINT8    ? TypeDesc(TypeDesc::UINT8)
+                          : info.type == CRT_TEXELS_UINT16 ? TypeDesc(TypeDesc::UINT16)
+                                                           : TypeDesc(TypeDesc::FLOAT);
+    const std::size_t pixel = channels.size() * type.size();
+    if (to.data == nullptr) return;
+
+    if (std::uint64_t{info.width} * info.height * pixel != to.bytes)
+        throw Failure{"it has changed while it was read"};
+    std::vector<unsigned char> own;  // The file's pixels, where the picture has others.
+    if (!placement.is_whole) own.resize(static_cast<std::size_t>(width * height) * pixel);
+    auto* const bytes = placement.is_whole ? to.data : own.data();
+    if (part == Part::Color && isPng(input) && crt::image::readPng(path, info, bytes, to.bytes)) return;
+    for (std::size_t c = 0; c < channels.size();) {
+        std::size_t end = c + 1;
+        while (end < channels.size() && channels[end] == channels[end - 1] + 1) ++end;
+        if (!input.read_image(0, 0, channels[c], channels[end - 1] + 1, type, bytes + c * type.size(),
+                              static_cast<OIIO::stride_t>(pixel)))
+            throw Failure{wordsOr(input.geterror(), "its pixels cannot be read")};
+        c = end;
+    }
+    if (placement.is_whole) return;
+    std::memset(to.data, 0, to.bytes);
+    placement.place(spec, bytes, to.data, pixel);
+}
+
+std::int32_t readPart(Part part, const char* path, CrtTexelsInfo* info, const Target& to, char* reason,
+                      std::uint32_t reason_size) {
     return guarded(reason, reason_size, [&] {
         *info = {};
-        if (beginningOf(path).compare(0, 3, "\xff\xd8\xff") == 0) {
-            const std::string why =
-                crt::image::readJpeg(path, info,
-                                     part == Part::Color ? static_cast<unsigned char*>(buffer) : nullptr,
-                                     buffer_bytes);
-            if (!why.empty()) throw Failure{why};
-            if (part == Part::Alpha) info->channels = 0;
-            return;
-        }
+        if (beginningOf(path).compare(0, 3, "\xff\xd8\xff") == 0) return readJpegPart(part, path, *info, to);
+        if (crt::image::beginsAsRadiance(path)) return readRadiancePart(part, path, *info, to);
         ImageSpec spec, wishes;
-        wishes.attribute("oiio:UnassociatedAlpha", 1);  // Else colours come multiplied by alpha.
-        const std::unique_ptr<ImageInput> input = openKnown(path, spec, wishes);
-        if (!input) {
-            if (!crt::image::beginsAsTga(path))
-                throw Failure{"it is no PNG, JPEG, TGA, EXR, Radiance HDR or PFM file"};
-            const auto tga_part =
-                part == Part::Color ? crt::image::TgaPart::Color : crt::image::TgaPart::Alpha;
-            const std::string why = crt::image::readTga(path, tga_part, info,
-                                                        static_cast<unsigned char*>(buffer), buffer_bytes);
-            if (!why.empty()) throw Failure{why};
-            return;
-        }
-        const auto width = static_cast<std::uint64_t>(std::max(spec.width, 0)),
-                   height = static_cast<std::uint64_t>(std::max(spec.height, 0));
-        crt::image::checkPixels(path, width, height,
-                                static_cast<std::uint64_t>(std::max(spec.nchannels, 0)));
-        crt::image::checkRows(width, height, spec.pixel_bytes(true));
-        const Placement placement(spec);
-        crt::image::checkPixels(path, static_cast<std::uint64_t>(placement.width),
-                                static_cast<std::uint64_t>(placement.height),
-                                static_cast<std::uint64_t>(std::max(spec.nchannels, 0)));
-        const std::vector<int> channels = channelsOf(spec, part);
-        info->width = static_cast<std::uint32_t>(placement.width);
-        info->height = static_cast<std::uint32_t>(placement.height);
-        info->channels = static_cast<std::uint32_t>(channels.size());
-        info->type = texelType(spec);
-        info->has_chromaticities =
-            spec.getattribute("chromaticities", TypeDesc(TypeDesc::FLOAT, 8), info->chromaticities);
-        if (buffer == nullptr) return;
-
-        const TypeDesc type = info->type == CRT_TEXELS_UINT8    ? TypeDesc(TypeDesc::UINT8)
-                              : info->type == CRT_TEXELS_UINT16 ? TypeDesc(TypeDesc::UINT16)
-                                                                : TypeDesc(TypeDesc::FLOAT);
-        const std::size_t pixel = channels.size() * type.size();
-        if (std::uint64_t{info->width} * info->height * pixel != buffer_bytes)
-            throw Failure{"it has changed while it was read"};
-        std::vector<unsigned char> own;  // The file's pixels, where the picture has others.
-        if (!placement.is_whole) own.resize(static_cast<std::size_t>(width * height) * pixel);
-        auto* const bytes = placement.is_whole ? static_cast<unsigned char*>(buffer) : own.data();
-        if (part == Part::Color && std::strcmp(input->format_name(), "png") == 0 &&
-            crt::image::readPng(path, *info, bytes, buffer_bytes))
-            return;
-        for (std::size_t c = 0; c < channels.size();) {
-            std::size_t end = c + 1;
-            while (end < channels.size() && channels[end] == channels[end - 1] + 1) ++end;
-            if (!input->read_image(0, 0, channels[c], channels[end - 1] + 1, type,
-                                   bytes + c * type.size(), static_cast<OIIO::stride_t>(pixel)))
-                throw Failure{wordsOr(input->geterror(), "its pixels cannot be read")};
-            c = end;
-        }
-        if (placement.is_whole) return;
-        std::memset(buffer, 0, buffer_bytes);
-        placement.place(spec, bytes, static_cast<unsigned char*>(buffer), pixel);
+        wishes.attribute("oiio:UnassociatedAlpha", 1);  // Else colours of PNG come multiplied by alpha.
+        if (const std::unique_ptr<ImageInput> input = openKnown(path, spec, wishes))
+            return readPartOf(*input, spec, part, path, *info, to);
+        readTgaPart(part, path, *info, to);
     });
 }
 
 std::int32_t readTexels(const char* path, CrtTexelsInfo* info, void* buffer, std::uint64_t buffer_bytes,
                         char* reason, std::uint32_t reason_size) {
-    return readPart(Part::Color, path, info, buffer, buffer_bytes, reason, reason_size);
+    return readPart(Part::Color, path, info, {static_cast<unsigned char*>(buffer), buffer_bytes}, reason,
+                    reason_size);
 }
 
 std::int32_t readAlpha(const char* path, CrtTexelsInfo* info, void* buffer, std::uint64_t buffer_bytes,
                        char* reason, std::uint32_t reason_size) {
-    return readPart(Part::Alpha, path, info, buffer, buffer_bytes, reason, reason_size);
+    return readPart(Part::Alpha, path, info, {static_cast<unsigned char*>(buffer), buffer_bytes}, reason,
+                    reason_size);
 }
 
 void freeImage(const CrtImagePlanes* image) { delete static_cast<const OwnedImage*>(image); }

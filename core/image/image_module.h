@@ -26,6 +26,13 @@ typedef struct CrtImageText {
     const char *value;
 } CrtImageText;
 
+/* What a file says of its pixels that is not applied to them; 0: it says nothing. */
+typedef struct CrtUnappliedTags {
+    float gamma;          /* PNG: gAMA, where no sRGB overrides it */
+    float exposure;       /* Radiance HDR: what its pixels were multiplied by */
+    uint32_t orientation; /* JPEG and PNG: EXIF, 1 to 8; 1 is as the pixels lie */
+} CrtUnappliedTags;
+
 /* Pixels row-major, top row first. */
 typedef struct CrtImagePlanes {
     uint32_t width, height;
@@ -48,6 +55,7 @@ typedef struct CrtImagePlanes {
     const float *world_to_camera, *world_to_ndc;
     const float *adopted_neutral;      /* to write only: {x, y}, or null */
     float white_luminance_cd_m2;       /* to write only: of (1, 1, 1); 0: not known */
+    CrtUnappliedTags tags;             /* read only */
 } CrtImagePlanes;
 
 #define CRT_TEXELS_UINT8 0u
@@ -61,6 +69,8 @@ typedef struct CrtTexelsInfo {
     uint32_t type;                 /* CRT_TEXELS_…; floats are linear */
     uint32_t has_chromaticities;
     float chromaticities[8];       /* {Rx, Ry, Gx, Gy, Bx, By, Wx, Wy} */
+    uint32_t is_associated;        /* 1: colours are multiplied by the alpha beside them */
+    CrtUnappliedTags tags;
 } CrtTexelsInfo;
 
 typedef struct CrtImageModule {
@@ -75,9 +85,10 @@ typedef struct CrtImageModule {
     int32_t (*write_png)(const char* path, uint32_t width, uint32_t height, const uint8_t* rgb,
                          const CrtImageText* metadata, uint32_t metadata_count, char* reason,
                          uint32_t reason_size);
-    /* EXR, PNG or Radiance HDR, by content; the first image of a file that holds several. *image stays valid
-       until freed. */
-    int32_t (*read)(const char *path, const CrtImagePlanes **image, char *reason, uint32_t reason_size);
+    /* EXR, PNG or Radiance HDR, by content; the first image of a file that holds several. One whose pixels
+       take more than most_bytes is refused. *image stays valid until freed. */
+    int32_t (*read)(const char *path, uint64_t most_bytes, const CrtImagePlanes **image, char *reason,
+                    uint32_t reason_size);
     void (*free_image)(const CrtImagePlanes *image);
     /* EXR, PNG, Radiance HDR, JPEG or TGA, by content. *info is filled in; with a buffer, which must have
        the bytes that an earlier *info says, [height][width][channels], too. */

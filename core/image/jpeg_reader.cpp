@@ -1,11 +1,13 @@
 #include "image/jpeg_reader.h"
 
+#include "image/exif_orientation.h"
 #include "image/image_headers.h"
 
 #include <csetjmp>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
+#include <string_view>
 
 #include <jpeglib.h>
 // After jpeglib.h, which it needs.
@@ -17,6 +19,8 @@ namespace {
 /// A progressive file may have any number of scans, each of which costs the time of the whole image;
 /// encoders make some ten.
 constexpr int kMostScans = 64;
+
+constexpr int kExifMarker = JPEG_APP0 + 1;
 
 struct Errors {
     jpeg_error_mgr manager;  // First: libjpeg knows the address of this alone.
@@ -46,6 +50,17 @@ void countScans(j_common_ptr codec) {
     std::longjmp(errors->escape, 1);
 }
 
+/// Of the first block of EXIF: "Exif", two zeros, and the block.
+std::uint32_t orientationIn(const jpeg_decompress_struct& codec) {
+    constexpr std::string_view kMark("Exif\0\0", 6);
+    for (const jpeg_marker_struct* marker = codec.marker_list; marker != nullptr; marker = marker->next) {
+        const std::string_view data(reinterpret_cast<const char*>(marker->data), marker->data_length);
+        if (marker->marker == kExifMarker && data.substr(0, kMark.size()) == kMark)
+            return exifOrientation(data.substr(kMark.size()));
+    }
+    return 0;
+}
+
 /// All that lives beyond a jump: nothing here has a destructor.
 struct Reader {
     jpeg_decompress_struct codec;
@@ -65,7 +80,9 @@ bool decode(Reader& reader, std::FILE* file, CrtTexelsInfo* info, unsigned char*
     reader.progress.progress_monitor = countScans;
     codec.progress = &reader.progress;
     jpeg_stdio_src(&codec, file);
+    jpeg_save_markers(&codec, kExifMarker, 0xffff);
     jpeg_read_header(&codec, TRUE);
+    info->tags.orientation = orientationIn(codec);
     const auto refuse = [&](const char* why) {
         std::snprintf(reader.errors.sentence, sizeof reader.errors.sentence, "%s", why);
         return false;
@@ -103,7 +120,9 @@ std::string readJpeg(const char* path, CrtTexelsInfo* info, unsigned char* buffe
     jpeg_destroy_decompress(&reader.codec);
     std::fclose(file);
     if (!good) return reader.errors.sentence;
-    // A block of 8 x 8 takes two bits or more for each component, of which colour has a quarter at best.
+    // A block of 8 x 8 takes a bit or more for each component, of which colour has a quarter at best; coded
+    // as arithmetic, blocks that are alike take almost nothing.
+    if (reader.codec.arith_code != FALSE) return {};
     constexpr std::uint64_t kPixelsAByte = 1024;
     std::error_code unknown;
     if (std::uint64_t{info->width} * info->height / kPixelsAByte > std::filesystem::file_size(path, unknown))

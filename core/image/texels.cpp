@@ -1,9 +1,11 @@
 #include "image/texels.h"
 
 #include "base/error.h"
+#include "base/host.h"
 #include "base/huge_pages.h"
 #include "base/input_file.h"
 #include "image/image_io.h"
+#include "image/memory_bound.h"
 #include "image/open_module.h"
 #include "spectra/spectra.h"
 
@@ -61,7 +63,7 @@ Texels readPfm(const std::string& path) {
     }
     requireSize(path, image.width, image.height);
     Texels texels;
-    texels.info = {image.width, image.height, 3, TexelType::Float, image.chromaticities};
+    texels.info = {image.width, image.height, 3, TexelType::Float, image.chromaticities, false, {}};
     texels.bytes.resize(image.pixels.size() * sizeof(float));
     std::memcpy(texels.bytes.data(), image.pixels.data(), texels.bytes.size());
     return texels;
@@ -79,6 +81,8 @@ TexelsInfo infoOf(const CrtTexelsInfo& raw) {
         info.chromaticities.emplace();
         std::copy_n(raw.chromaticities, 8, info.chromaticities->begin());
     }
+    info.is_associated = raw.is_associated != 0;
+    info.tags = {raw.tags.gamma, raw.tags.exposure, raw.tags.orientation};
     return info;
 }
 
@@ -100,6 +104,12 @@ Texels readPart(const std::string& path, Part part) {
     Texels texels;
     texels.info = readWithModule(path, part, nullptr, 0);
     if (texels.info.channels == 0) return texels;
+    // Half: what is made of the pixels takes as much again.
+    if (const std::string why =
+            refusalForMemory(texels.info.width, texels.info.height,
+                             texels.info.channels * bytesOf(texels.info.type), availableHostMemory() / 2);
+        !why.empty())
+        refuse(path, why);
     texels.bytes.reserve(texels.info.bytes());
     adviseHugePages(texels.bytes.data(), texels.bytes.capacity());
     texels.bytes.resize(texels.info.bytes());
@@ -187,6 +197,25 @@ Texels readAlpha(const std::string& path) {
     texels.info = texelsInfo(path);
     texels.info.channels = 0;
     return texels;
+}
+
+void divideByAlpha(Texels& colors, const Texels& alpha) {
+    // A quotient that is 1 but for the rounding of two halves is 1.
+    constexpr float kRounding = 1.0f / 1024;
+    const std::size_t channels = colors.info.channels;
+    for (std::size_t i = 0; i < colors.info.count() && alpha.info.channels != 0; ++i) {
+        float a;
+        std::memcpy(&a, &alpha.bytes[i * sizeof a], sizeof a);
+        if (!(a > 0) || a == 1) continue;
+        for (std::size_t c = 0; c < channels; ++c) {
+            unsigned char* const at = &colors.bytes[(i * channels + c) * sizeof(float)];
+            float color;
+            std::memcpy(&color, at, sizeof color);
+            color /= a;
+            if (color > 1 && color < 1 + kRounding) color = 1;
+            std::memcpy(at, &color, sizeof color);
+        }
+    }
 }
 
 TexelsInfo texelsInfo(const ImageSource& source) {

@@ -2,6 +2,8 @@
 /// as the file holds them: a texture of 8 bits stays 8 bits until it becomes something else.
 #pragma once
 
+#include "image/unapplied_tags.h"
+
 #include <array>
 #include <cstdint>
 #include <memory>
@@ -21,6 +23,8 @@ struct TexelsInfo {
     std::uint32_t channels = 0;  ///< 1: grey, or alpha; 3: red, green, blue; 0: there is no alpha.
     TexelType type = TexelType::Uint8;
     std::optional<std::array<double, 8>> chromaticities;  ///< Of floats, where the file says them.
+    bool is_associated = false;  ///< Colours are multiplied by the alpha beside them, as EXR has it.
+    UnappliedTags tags{};
 
     std::uint64_t count() const { return std::uint64_t{width} * height; }
     std::uint64_t bytes() const;
@@ -33,8 +37,8 @@ struct Texels {
 };
 
 /// What the header of a PNG, JPEG, TGA, EXR, Radiance HDR or PFM says. Throws crt::Error(Scene), "cannot
-/// read the image 'x.png': …", for a file that is missing, of another format, larger than kMostTexels, or
-/// whose pixels cannot lie in a file of its size.
+/// read the image 'x.png': …", for a file that is missing, of another format, larger than kMostTexels,
+/// whose pixels cannot lie in a file of its size, or take more than half of the memory that is free.
 TexelsInfo texelsInfo(const std::string& path);
 
 /// The pixels too. Throws crt::Error(Scene) also for one that is truncated or damaged.
@@ -43,9 +47,13 @@ Texels readTexels(const std::string& path);
 /// The alpha of an image's pixels; one that has none has no channels and no bytes. Throws as readTexels().
 Texels readAlpha(const std::string& path);
 
+/// Divides colours, which are floats, by the alpha of the same pixels. Those of alpha 0 stay: they are light
+/// without a surface.
+void divideByAlpha(Texels& colors, const Texels& alpha);
+
 /// An image in a file of its own, or as bytes in a file of another kind.
 struct ImageSource {
-    std::string name;  ///< For messages: the path, or "a.glb (image 2)".
+    std::string name;                            ///< For messages: the path, or "a.glb (image 2)".
     std::shared_ptr<const std::string> bytes{};  ///< Null: `name` is the path of a file.
 };
 TexelsInfo texelsInfo(const ImageSource& source);

@@ -189,6 +189,8 @@ struct Mesh {
     /// Texture coordinates, v up; empty, or referenced by `uv_index`.
     std::vector<std::array<double, 2>> uvs;
     std::vector<std::array<std::uint32_t, 3>> uv_index;  ///< Empty, or one per triangle; kNoUv = none.
+    /// The first of each pair is the opacity of a vertex, for textures that ask for it and no others.
+    bool uvs_are_opacity = false;
     /// Linear sRGB in [0, 1], as of `positions`; or empty.
     std::vector<std::array<float, 3>> colors;
     std::vector<std::int32_t> material;  ///< Empty, or one index into Scene::materials per triangle.

@@ -58,6 +58,7 @@ struct Texture {
     /// Texture coordinates → those of the image, both with v up: rows of two and an offset, (u', v') = (m0
     /// u + m1 v + m2, m3 u + m4 v + m5). The image is the unit square, as are the squares of a checker.
     std::array<double, 6> transform{1, 0, 0, 0, 1, 0};
+    bool of_opacity = false;  ///< Image: of meshes whose coordinates are opacities alone (Mesh).
     SourcePlace place;
 };
 

@@ -875,13 +875,8 @@ def texture_cases(samples):
     texture("a PNG of 60000 x 60000 in 100 bytes", "a.png", png(60000, 60000, b"\0" * 1000), "pixels")
     texture("a PNG cut in the middle", "a.png", png(64, 64)[:80], "a.png")
     texture("a PNG whose rows end early", "a.png", png(64, 64, b"\0" * 5000), "a.png")
-    grey = png(16384, 16384, b"\0" * (16385 * 16384)).replace(
-        struct.pack(">IIBBBBB", 16384, 16384, 8, 2, 0, 0, 0),
-        struct.pack(">IIBBBBB", 16384, 16384, 8, 0, 0, 0, 0),
-    )
-    head = grey.index(b"IHDR")
-    grey = grey[:head + 17] + struct.pack(">I", zlib.crc32(grey[head:head + 17])) + grey[head + 21:]
-    texture("16384 x 16384 black texels in 260 KB", "a.png", grey, "CRT_SCENE_MEMORY")
+    black = png(16384, 16384, b"\0" * (16385 * 16384), color=0)
+    texture("16384 x 16384 black texels in 260 KB", "a.png", black, "CRT_SCENE_MEMORY")
     for cut in (20, len(jpeg) // 2, len(jpeg) - 20):
         texture(f"a JPEG cut after {cut} bytes", "a.jpg", jpeg[:cut], "a.jpg")
     frame = jpeg.index(b"\xff\xc0") + 5
@@ -907,7 +902,7 @@ def texture_cases(samples):
 # -----------------------------------------------------------------------------------------------------------
 # films and images
 
-def png(width, height, rows=None):
+def png(width, height, rows=None, color=2):
     def chunk(name, data):
         return struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
     data = zlib.compress(
@@ -915,7 +910,7 @@ def png(width, height, rows=None):
     )
     return (
         b"\x89PNG\r\n\x1a\n"
-        + chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0))
+        + chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, color, 0, 0, 0))
         + chunk(b"IDAT", data)
         + chunk(b"IEND", b"")
     )
@@ -957,8 +952,21 @@ def image_cases(samples):
         image(f"a PPM that begins {header[:32]!r}", "a.ppm", header)
     image("a PNG of 2^31 pixels a side in 100 bytes", "a.png", png(2147483647, 2147483647, b"\0"))
     image("a PNG of 60000 x 60000 in 100 bytes", "a.png", png(60000, 60000, b"\0" * 1000))
+    image(
+        "16384 x 16384 pixels where there are 2 GB of memory",
+        "a.png",
+        png(16384, 16384, b"\0" * (16385 * 16384), color=0),
+        words="half of what is free",
+        limits={resource.RLIMIT_AS: 2 << 30},
+    )
     image("a PNG without its end", "a.png", png(8, 8)[:-12])
     image("a PNG cut in the middle", "a.png", png(64, 64)[:80])
+    image(
+        "a Radiance HDR of 65535 x 65535 pixels in 70 bytes",
+        "a.exr",
+        b"#?RGBE\nFORMAT=32-bit_rle_rgbe\n\n-Y 65535 +X 65535\n" + bytes(12),
+        words="a file of its size",
+    )
     image("a Radiance HDR of noise", "a.exr", b"#?RADIANCE\n\n-Y 100000 +X 100000\n" + bytes(range(256)))
     for cut in (8, 40, 300):
         image(f"an EXR cut after {cut} bytes", "a.exr", samples["exr"][:cut])

@@ -24,9 +24,11 @@ KEYWORDS = ("SOURCES", "USES", "LIBRARIES", "HEADERS")
 # Files of a room's folder that other targets are made of.
 OTHER_TARGETS = {
     "image/image_io_oiio.cpp",
+    "image/exif_orientation.cpp",
     "image/image_headers.cpp",
     "image/jpeg_reader.cpp",
     "image/png_reader.cpp",
+    "image/radiance_reader.cpp",
     "image/tga_reader.cpp",
     "backend/sdk/kernel_cache.cpp",
     "cli/main.cpp",

@@ -174,6 +174,7 @@ std::vector<std::array<double, kWidth>> GltfAccessor::rows() const {
 
 template std::vector<std::array<double, 2>> GltfAccessor::rows<2>() const;
 template std::vector<std::array<double, 3>> GltfAccessor::rows<3>() const;
+template std::vector<std::array<double, 4>> GltfAccessor::rows<4>() const;
 template std::vector<std::array<double, 16>> GltfAccessor::rows<16>() const;
 
 std::vector<std::uint32_t> GltfAccessor::indices() const {

@@ -101,20 +101,49 @@ void readNormals(const GltfAccessor& accessor, Mesh& mesh) {
             triangle = {kNoNormal, kNoNormal, kNoNormal};
 }
 
+std::string pointerTo(std::size_t mesh, std::size_t primitive) {
+    return fmt::format("/meshes/{}/primitives/{}", mesh, primitive);
+}
+
+const tinygltf::Primitive& primitiveOf(GltfFile& file, std::size_t mesh, std::size_t primitive) {
+    const tinygltf::Model& model = file.model();
+    if (mesh >= model.meshes.size())
+        file.fail("/meshes", fmt::format("there is no mesh {}: the file has {}, counted from 0", mesh,
+                                         model.meshes.size()));
+    const std::vector<tinygltf::Primitive>& primitives = model.meshes[mesh].primitives;
+    if (primitive >= primitives.size())
+        file.fail(fmt::format("/meshes/{}/primitives", mesh),
+                  fmt::format("there is no primitive {}: the mesh has {}, counted from 0", primitive,
+                              primitives.size()));
+    return primitives[primitive];
+}
+
+void readUvs(GltfFile& file, const GltfAccessor& accessor, const std::string& at, Mesh& mesh) {
+    accessor.requireComponents(2, 2);
+    mesh.uvs = accessor.rows<2>();
+    for (std::size_t i = 0; i < mesh.uvs.size(); ++i) {
+        std::array<double, 2>& uv = mesh.uvs[i];
+        if (std::abs(uv[0]) > kMostCoordinate || std::abs(uv[1]) > kMostCoordinate)
+            file.fail(at, fmt::format("element {} is beyond {:g}", i, kMostCoordinate));
+        uv[1] = 1 - uv[1];  // glTF's v goes down.
+    }
+    mesh.uv_index = mesh.triangles;
+}
+
+/// Alphas, in [0, 1], as u.
+void readOpacity(const GltfAccessor& colors, Mesh& mesh) {
+    colors.requireComponents(4, 4);
+    for (const std::array<double, 4>& c : colors.rows<4>())
+        mesh.uvs.push_back({std::clamp(c[3], 0.0, 1.0), 0});
+    mesh.uv_index = mesh.triangles;
+    mesh.uvs_are_opacity = true;
+}
+
 }  // namespace
 
 Mesh readGltfPrimitive(GltfFile& file, const GltfPrimitive& which, std::uint64_t& without_area) {
-    const tinygltf::Model& model = file.model();
-    if (which.mesh >= model.meshes.size())
-        file.fail("/meshes", fmt::format("there is no mesh {}: the file has {}, counted from 0", which.mesh,
-                                         model.meshes.size()));
-    const std::vector<tinygltf::Primitive>& primitives = model.meshes[which.mesh].primitives;
-    if (which.primitive >= primitives.size())
-        file.fail(fmt::format("/meshes/{}/primitives", which.mesh),
-                  fmt::format("there is no primitive {}: the mesh has {}, counted from 0", which.primitive,
-                              primitives.size()));
-    const std::string pointer = fmt::format("/meshes/{}/primitives/{}", which.mesh, which.primitive);
-    const tinygltf::Primitive& primitive = primitives[which.primitive];
+    const tinygltf::Primitive& primitive = primitiveOf(file, which.mesh, which.primitive);
+    const std::string pointer = pointerTo(which.mesh, which.primitive);
     const Attributes attributes(file, primitive, pointer);
     const std::optional<GltfAccessor> positions = attributes.find("POSITION", 0);
     if (!positions) file.fail(pointer + "/attributes", "'POSITION' is missing");
@@ -125,20 +154,14 @@ Mesh readGltfPrimitive(GltfFile& file, const GltfPrimitive& which, std::uint64_t
     readTriangles(file, primitive, pointer, mesh, without_area);
     if (const auto normals = attributes.find("NORMAL", count)) readNormals(*normals, mesh);
     const std::string uv_name = fmt::format("TEXCOORD_{}", which.uv_set);
-    if (const auto uvs = attributes.find(uv_name, count)) {
-        uvs->requireComponents(2, 2);
-        mesh.uvs = uvs->rows<2>();
-        for (std::size_t i = 0; i < count; ++i) {
-            std::array<double, 2>& uv = mesh.uvs[i];
-            if (std::abs(uv[0]) > kMostCoordinate || std::abs(uv[1]) > kMostCoordinate)
-                file.fail(fmt::format("{}/attributes/{}", pointer, uv_name),
-                          fmt::format("element {} is beyond {:g}", i, kMostCoordinate));
-            uv[1] = 1 - uv[1];  // glTF's v goes down.
-        }
-        mesh.uv_index = mesh.triangles;
-    }
-    if (const auto colors = attributes.find("COLOR_0", count)) {
+    if (const auto uvs = attributes.find(uv_name, count); uvs && !which.opacity)
+        readUvs(file, *uvs, fmt::format("{}/attributes/{}", pointer, uv_name), mesh);
+    const auto colors = attributes.find("COLOR_0", count);
+    if (which.opacity && !colors)
+        file.fail(pointer + "/attributes", "'COLOR_0' is missing, whose alpha is asked for");
+    if (colors) {
         colors->requireComponents(3, 4);
+        if (which.opacity) readOpacity(*colors, mesh);
         for (const Vec3d& c : colors->rows<3>()) {
             std::array<float, 3> color;
             for (std::size_t k = 0; k < 3; ++k)
@@ -147,6 +170,30 @@ Mesh readGltfPrimitive(GltfFile& file, const GltfPrimitive& which, std::uint64_t
         }
     }
     return mesh;
+}
+
+std::array<double, 2> alphaRange(GltfFile& file, std::size_t mesh, std::size_t primitive) {
+    const tinygltf::Primitive& which = primitiveOf(file, mesh, primitive);
+    const Attributes attributes(file, which, pointerTo(mesh, primitive));
+    const std::optional<GltfAccessor> colors = attributes.find("COLOR_0", 0);
+    std::array<double, 2> range{1, 1};
+    if (!colors || colors->components() < 4 || colors->count() == 0) return range;
+    range = {1, 0};
+    for (const std::array<double, 4>& c : colors->rows<4>()) {
+        const double alpha = std::clamp(c[3], 0.0, 1.0);
+        range = {std::min(range[0], alpha), std::max(range[1], alpha)};
+    }
+    return range;
+}
+
+std::vector<std::array<double, 4>> readGltfTangents(GltfFile& file, std::size_t mesh,
+                                                    std::size_t primitive) {
+    const std::string pointer = pointerTo(mesh, primitive);
+    const Attributes attributes(file, primitiveOf(file, mesh, primitive), pointer);
+    const std::optional<GltfAccessor> tangents = attributes.find("TANGENT", 0);
+    if (!tangents) return {};
+    tangents->requireComponents(4, 4);
+    return tangents->rows<4>();
 }
 
 }  // namespace crt

@@ -7,6 +7,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <vector>
 
 namespace crt {
 
@@ -14,6 +15,7 @@ struct GltfPrimitive {
     std::size_t mesh = 0, primitive = 0;
     std::size_t uv_set = 0;                       ///< n of TEXCOORD_n.
     std::array<double, 3> color_factor{1, 1, 1};  ///< On COLOR_0, linear sRGB.
+    bool opacity = false;  ///< The alpha of COLOR_0 in place of texture coordinates (Mesh::uvs_are_opacity).
 
     auto operator<=>(const GltfPrimitive&) const = default;
 };
@@ -23,5 +25,11 @@ struct GltfPrimitive {
 /// for a primitive that is not there, has no triangles by its mode, or whose numbers are out of range.
 /// What it has is told by the members that are not empty.
 Mesh readGltfPrimitive(GltfFile& file, const GltfPrimitive& which, std::uint64_t& without_area);
+
+/// How the alpha of COLOR_0 is distributed: its least and its most; 1 and 1 where there is none.
+std::array<double, 2> alphaRange(GltfFile& file, std::size_t mesh, std::size_t primitive);
+
+/// TANGENT, by vertex: a direction, and which way the other one of the surface turns; empty: none.
+std::vector<std::array<double, 4>> readGltfTangents(GltfFile& file, std::size_t mesh, std::size_t primitive);
 
 }  // namespace crt

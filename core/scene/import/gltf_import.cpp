@@ -4,6 +4,7 @@
 #include "scene/gltf/gltf_json.h"
 #include "scene/gltf/gltf_mesh.h"
 #include "scene/gltf/gltf_model.h"
+#include "scene/gltf/gltf_tangents.h"
 #include "scene/import/gltf_graph.h"
 #include "scene/import/gltf_materials.h"
 #include "scene/light_units.h"
@@ -65,8 +66,10 @@ private:
     std::string cameraText();
     std::string lightsText() const;
     std::string environmentText() const;
-    std::string exposureText(double& film_ev) const;
     double illuminance() const;
+    double exposure() const;
+    std::string environmentBesideLights() const;
+    void noteTangents(std::size_t mesh, std::size_t primitive, std::size_t uv_set);
 
     GltfFile& file_;
     const tinygltf::Model& model_;
@@ -79,6 +82,7 @@ private:
     GltfMaterials materials_;
     UniqueNames names_;
     Bounds bounds_;
+    double extent_ = 0, mirroring_extent_ = 0;   ///< Squares of sizes of primitives, as a measure of area.
     std::vector<std::vector<Matrix4d>> worlds_;  ///< By mesh, where it stands.
     std::optional<InnerView> inner_;             ///< Where the chosen camera is, if not around everything.
 };
@@ -109,21 +113,36 @@ std::string Writer::primitiveText(int mesh, std::size_t number, const std::vecto
     positions.requireComponents(3, 3);
     Bounds own;
     for (const Vec3d& p : positions.rows<3>()) own.add(p);
-    for (const Matrix4d& world : worlds)
+    double extent = 0;
+    for (const Matrix4d& world : worlds) {
+        Bounds placed;
         for (int corner = 0; corner < 8; ++corner)
-            bounds_.add(pointAt(
+            placed.add(pointAt(
                 world, {corner & 1 ? own.upper[0] : own.lower[0], corner & 2 ? own.upper[1] : own.lower[1],
                         corner & 4 ? own.upper[2] : own.lower[2]}));
+        bounds_.add(placed.lower);
+        bounds_.add(placed.upper);
+        extent += placed.radius() * placed.radius();
+    }
     GltfMaterialUse use{.material = primitive.material, .colors = primitive.attributes.contains("COLOR_0")};
+    if (use.colors && use.material >= 0 &&
+        static_cast<std::size_t>(use.material) < model_.materials.size() &&
+        model_.materials[static_cast<std::size_t>(use.material)].alphaMode != "OPAQUE")
+        use.alpha = alphaRange(file_, static_cast<std::size_t>(mesh), number);
     for (unsigned set = 0; set < 8; ++set)
         if (primitive.attributes.contains(fmt::format("TEXCOORD_{}", set))) use.uv_sets |= 1u << set;
     const GltfMaterialText& material = materials_.of(use);
+    extent_ += extent;
+    mirroring_extent_ += extent * material.mirrors;
+    if (material.normal_map && primitive.attributes.contains("TANGENT"))
+        noteTangents(static_cast<std::size_t>(mesh), number, material.uv_set);
     std::string text =
         fmt::format("  - name: {}\n    gltf: {{file: {}, mesh: {}, primitive: {}",
                     yamlText(names_.take(name, "object")), yamlText(file_name_), mesh, number);
     if (material.uv_set > 0) text += fmt::format(", uv_set: {}", material.uv_set);
     if (use.colors && material.color_factor != std::array<double, 3>{1, 1, 1})
         text += ", color_factor: " + yamlList(material.color_factor);
+    if (material.vertex_opacity) text += ", vertex_opacity: true";
     if (allow_outside_) text += ", allow_outside: true";
     text += fmt::format("}}\n    material: {}\n", yamlText(material.name));
     if (!material.emission.empty()) text += fmt::format("    emission: {}\n", material.emission);
@@ -134,6 +153,17 @@ std::string Writer::primitiveText(int mesh, std::size_t number, const std::vecto
     text += "    transforms:\n";
     for (const Matrix4d& world : worlds) text += fmt::format("      - {}\n", steps(world));
     return text;
+}
+
+void Writer::noteTangents(std::size_t mesh, std::size_t primitive, std::size_t uv_set) {
+    std::uint64_t without_area = 0;
+    const Mesh read =
+        readGltfPrimitive(file_, {.mesh = mesh, .primitive = primitive, .uv_set = uv_set}, without_area);
+    if (hasOtherTangents(read, readGltfTangents(file_, mesh, primitive)))
+        losses_.add(
+            "tangents (TANGENT) that differ from those of the texture coordinates, by which crt turns "
+            "normal "
+            "maps");
 }
 
 /// An object for each primitive, placed as often as its mesh is.
@@ -263,17 +293,34 @@ std::string Writer::cameraText() {
     }
     std::string film = fmt::format("resolution: [{}, {}]", width, height);
     if (!graph_.lights.empty()) {
-        const double lux = illuminance();
-        const double ev = lux > 0 ? std::log2(0.8 * std::numbers::pi / (lux * nit_)) : std::log2(1 / nit_);
         text += "# Exposed for a white surface that faces the lights.\n";
-        film += fmt::format(", exposure_ev: {:.2f}", std::clamp(ev, -100.0, 100.0));
+        film += fmt::format(", exposure_ev: {:.2f}", exposure());
     }
     text += fmt::format("film: {{{}}}\nsampler: {{samples: 128}}\n", film);
     return text;
 }
 
+/// In stops.
+double Writer::exposure() const {
+    constexpr double kMost_ev = 100;
+    const double lux = illuminance();
+    const double ev = lux > 0 ? std::log2(0.8 * std::numbers::pi / (lux * nit_)) : std::log2(1 / nit_);
+    return std::clamp(ev, -kMost_ev, kMost_ev);
+}
+
+/// Lights of glTF have no size: metal and glass, which show what surrounds them, would be black.
+std::string Writer::environmentBesideLights() const {
+    constexpr double kMostMirrors = 0.5;
+    if (!(mirroring_extent_ > kMostMirrors * extent_)) return {};
+    losses_.choose(
+        "a grey sky beside the file's lights, since most of it is metal or glass, which show what surrounds "
+        "them (`--set environment=null` leaves it out)");
+    return chosenSky("most of the file is metal or glass, which show what surrounds them",
+                     std::exp2(-exposure()));
+}
+
 std::string Writer::environmentText() const {
-    if (!graph_.lights.empty()) return {};
+    if (!graph_.lights.empty()) return environmentBesideLights();
     losses_.choose(inner_ ? "a grey sky and a lamp at the camera" : "a grey sky and a lamp");
     return chosenLight(inner_);
 }

@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace crt {
 namespace {
@@ -23,8 +24,6 @@ bool hasExtension(const tinygltf::Material& material, const char* name) {
 double unitOf(double value) { return std::clamp(value, 0.0, 1.0); }
 
 const std::array<double, 3> kWhite{1, 1, 1};
-
-double largestOf(const std::array<double, 3>& c) { return std::max({c[0], c[1], c[2]}); }
 
 std::array<double, 3> bounded(std::array<double, 3> color) {
     for (double& c : color) c = unitOf(c);
@@ -85,6 +84,13 @@ struct GltfMaterials::Surface {
     bool all_clear = false, absorbs = false;
     std::string pane;  ///< Share of the surface that is a pane; empty: none.
     std::string pane_ior;
+
+    /// A share of glass or of a pane that a texture says counts as all of it.
+    double mirrors() const {
+        constexpr double kGlossy = 0.5;
+        const bool transmits = all_clear || pane == "1" || clear.starts_with("{") || pane.starts_with("{");
+        return transmits ? 1 : rough < kGlossy ? metal : 0;
+    }
 };
 
 /// The texture, where the primitive has its coordinates and crt reads its image; else it is a loss.
@@ -170,7 +176,8 @@ void GltfMaterials::readOpacity(Source& source, Surface& surface) {
     const tinygltf::Material& material = source.material;
     const tinygltf::PbrMetallicRoughness& pbr = material.pbrMetallicRoughness;
     if (material.alphaMode != "MASK" && material.alphaMode != "BLEND") return;
-    const double factor = pbr.baseColorFactor.size() > 3 ? unitOf(pbr.baseColorFactor[3]) : 1;
+    double factor = pbr.baseColorFactor.size() > 3 ? unitOf(pbr.baseColorFactor[3]) : 1;
+    if (source.use.alpha[0] == source.use.alpha[1]) factor *= source.use.alpha[0];
     const bool mask = material.alphaMode == "MASK";
     const auto texture = usable(source,
                                 textures_.named(pbr.baseColorTexture.index, pbr.baseColorTexture.texCoord,
@@ -193,6 +200,27 @@ void GltfMaterials::readOpacity(Source& source, Surface& surface) {
     surface.opacity = textures_.form(*texture, more);
 }
 
+/// Where the alpha of COLOR_0 varies. It takes the place of texture coordinates, so that there can be no
+/// texture beside it.
+void GltfMaterials::readVertexOpacity(Source& source, Surface& surface) {
+    const tinygltf::Material& material = source.material;
+    if (source.use.alpha[0] == source.use.alpha[1] ||
+        (material.alphaMode != "MASK" && material.alphaMode != "BLEND"))
+        return;
+    if (source.set)
+        return losses_.add("the alpha of vertices beside a texture: the opacity is that of the texture");
+    const std::vector<double>& color = material.pbrMetallicRoughness.baseColorFactor;
+    const double factor = color.size() > 3 ? unitOf(color[3]) : 1,
+                 cutoff = std::max(material.alphaCutoff, 0.0);
+    const bool mask = material.alphaMode == "MASK";
+    if (factor == 0 || (mask && cutoff > factor)) return;  // As without it: nothing is there.
+    std::string form = "{attribute: opacity";
+    if (mask) form += ", cutoff: " + yamlNumber(cutoff / factor);
+    if (!mask && factor != 1) form += ", factor: " + yamlNumber(factor);
+    surface.opacity = form + "}";
+    source.text.vertex_opacity = true;
+}
+
 void GltfMaterials::readNormals(Source& source, Surface& surface) {
     const tinygltf::NormalTextureInfo& info = source.material.normalTexture;
     const auto texture = usable(source,
@@ -204,6 +232,7 @@ void GltfMaterials::readNormals(Source& source, Surface& surface) {
     if (info.scale < 0 || info.scale > 100)
         losses_.add("the scale of a normal map, which is none of 0 to 100");
     const double strength = std::clamp(info.scale, 0.0, 100.0);
+    source.text.normal_map = true;
     surface.normal_map =
         textures_.form(*texture, strength == 1 ? "" : ", strength: " + yamlNumber(strength));
 }
@@ -299,14 +328,14 @@ void GltfMaterials::readCoat(Source& source, Surface& surface) {
 void GltfMaterials::readFuzz(Source& source, Surface& surface) {
     const Value& sheen = gltfExtension(source.material, "KHR_materials_sheen");
     std::array<double, 3> color = bounded(gltfColor(sheen, "sheenColorFactor", {0, 0, 0}));
-    if (largestOf(color) > 0)
+    if (gltfLargest(color) > 0)
         if (const auto texture = usable(source, textures_.named(sheen, "sheenColorTexture", source.pointer),
                                         "the texture of the sheen")) {
             const TexelStatistics& texels = textures_.statistics(*texture);
             if (!texels.isConstant()) losses_.add("the texture of a sheen: its mean");
             for (std::size_t k = 0; k < 3; ++k) color[k] *= texels.linear_mean[k];
         }
-    const double most = largestOf(color);
+    const double most = gltfLargest(color);
     if (most == 0) return;
     if (sheen.Has("sheenRoughnessTexture")) losses_.add("the texture of a sheen's roughness");
     losses_.add("sheen: fuzz of OpenPBR, which is another model");
@@ -323,9 +352,9 @@ void GltfMaterials::readEmission(Source& source) {
     std::array<double, 3> color{0, 0, 0};
     for (std::size_t k = 0; k < 3 && k < source.material.emissiveFactor.size(); ++k)
         color[k] = std::max(source.material.emissiveFactor[k], 0.0);
-    if (largestOf(color) == 0) return;
+    if (gltfLargest(color) == 0) return;
     // Up to 1 says the standard, but older exporters put the strength here.
-    if (!(largestOf(color) < 1e6)) file_.fail(source.pointer + "/emissiveFactor", "it is beyond any use");
+    if (!(gltfLargest(color) < 1e6)) file_.fail(source.pointer + "/emissiveFactor", "it is beyond any use");
     const double strength = std::clamp(
         gltfNumber(gltfExtension(source.material, "KHR_materials_emissive_strength"), "emissiveStrength", 1),
         0.0, 1e15);
@@ -341,7 +370,7 @@ void GltfMaterials::readEmission(Source& source) {
             return losses_.add("light that a texture says: crt's lamps are equally bright everywhere");
         for (std::size_t k = 0; k < 3; ++k) color[k] *= texels.linear_mean[k];
     }
-    const double most = largestOf(color);
+    const double most = gltfLargest(color);
     if (!(most * strength > 0)) return;
     for (double& c : color) c /= most;
     source.text.emission = fmt::format("{{radiance: {}{}}}", lightText(color, most * strength * nit_),
@@ -357,7 +386,7 @@ bool GltfMaterials::readUnlit(Source& source) {
     }
     Surface surface;
     readColor(source, surface);
-    if (largestOf(surface.color_factor) > 0)
+    if (gltfLargest(surface.color_factor) > 0)
         source.text.emission =
             fmt::format("{{radiance: {}, two_sided: true}}", lightText(surface.color_factor, nit_));
     add(source.text.name, {{"type", "diffuse"}, {"reflectance", "0"}});
@@ -371,7 +400,7 @@ void GltfMaterials::add(const std::string& name, const Keys& keys) {
 }
 
 /// One openpbr material, or, where OpenPBR says it of metal or of glass alone, a mix of two.
-void GltfMaterials::write(Source& source, const Surface& s) {
+void GltfMaterials::write(const std::string& name, const Surface& s) {
     const bool metal = s.metal > 0 || !s.metal_texture.empty(), textured = !s.rough_texture.empty();
     const bool dielectric = s.metal < 1 || !s.metal_texture.empty();
     const bool weighted = std::any_of(s.dielectric.begin(), s.dielectric.end(),
@@ -400,7 +429,6 @@ void GltfMaterials::write(Source& source, const Surface& s) {
         return keys;
     };
     const bool pane = !s.pane.empty();
-    const std::string& name = source.text.name;
     std::string surface = pane ? names_.take(name + " (surface)", "") : name;
     if (split) {
         const std::string below = names_.take(name + " (dielectric)", ""),
@@ -434,8 +462,9 @@ const GltfMaterialText& GltfMaterials::of(const GltfMaterialUse& use) {
     const tinygltf::Material& said =
         own ? model.materials[static_cast<std::size_t>(use.material)] : standardMaterial();
     const std::string pointer = fmt::format("/materials/{}", use.material);
+    std::optional<GltfMetalParts> metal;
     const std::optional<tinygltf::Material> converted =
-        withoutSpecularGlossiness(said, textures_, pointer, losses_);
+        withoutSpecularGlossiness(said, textures_, pointer, losses_, metal);
     const tinygltf::Material& material = converted ? *converted : said;
     text.name = names_.take(material.name, own ? fmt::format("material {}", use.material) : "standard");
     Source source{material, use, text, pointer, {}};
@@ -443,9 +472,15 @@ const GltfMaterialText& GltfMaterials::of(const GltfMaterialUse& use) {
         losses_.add("textures of ambient occlusion, which light itself makes here");
     if (readUnlit(source)) return text;
     Surface surface;
+    read(source, surface);
+    if (!metal || !writeByTexel(source, surface, *metal)) write(text.name, surface);
+    return text;
+}
+
+void GltfMaterials::read(Source& source, Surface& surface) {
     readColor(source, surface);
     readMetal(source, surface);
-    if (hasExtension(material, "KHR_materials_unlit")) surface.metal = 0, surface.rough = 1;
+    if (hasExtension(source.material, "KHR_materials_unlit")) surface.metal = 0, surface.rough = 1;
     readOpacity(source, surface);
     readNormals(source, surface);
     readDielectric(source, surface);
@@ -453,29 +488,55 @@ const GltfMaterialText& GltfMaterials::of(const GltfMaterialUse& use) {
     readCoat(source, surface);
     readFuzz(source, surface);
     readEmission(source);
-    const Value& film = gltfExtension(material, "KHR_materials_iridescence");
-    if (const double factor = unitOf(gltfNumber(film, "iridescenceFactor", 0)); factor > 0) {
-        if (surface.all_clear && surface.metal == 0 && surface.metal_texture.empty()) {
-            const double thickness =
-                std::clamp(gltfNumber(film, "iridescenceThicknessMaximum", 400), 0.0, 20000.0);
-            surface.dielectric.emplace_back("thin_film_weight", yamlNumber(factor));
-            surface.dielectric.emplace_back("thin_film_thickness", yamlNumber(thickness / 1000));
-            surface.dielectric.emplace_back(
-                "thin_film_ior", yamlNumber(std::clamp(gltfNumber(film, "iridescenceIor", 1.3), 1.0, 10.0)));
-            if (film.Has("iridescenceTexture") || film.Has("iridescenceThicknessTexture"))
-                losses_.add("textures of iridescence");
-        } else {
-            losses_.add("iridescence of what is not glass");
-        }
-    }
-    if (gltfNumber(gltfExtension(material, "KHR_materials_anisotropy"), "anisotropyStrength", 0) > 0)
+    readVertexOpacity(source, surface);
+    readIridescence(source, surface);
+    if (gltfNumber(gltfExtension(source.material, "KHR_materials_anisotropy"), "anisotropyStrength", 0) > 0)
         losses_.add("anisotropy");
     if (surface.absorbs && !surface.opacity.empty()) {
         losses_.add("the opacity of glass that absorbs");
         surface.opacity.clear();
     }
-    write(source, surface);
-    return text;
+    source.text.mirrors = surface.mirrors();
+}
+
+void GltfMaterials::readIridescence(const Source& source, Surface& surface) {
+    const Value& film = gltfExtension(source.material, "KHR_materials_iridescence");
+    const double factor = unitOf(gltfNumber(film, "iridescenceFactor", 0));
+    if (factor <= 0) return;
+    if (!surface.all_clear || surface.metal != 0 || !surface.metal_texture.empty())
+        return losses_.add("iridescence of what is not glass");
+    const double thickness = std::clamp(gltfNumber(film, "iridescenceThicknessMaximum", 400), 0.0, 20000.0);
+    surface.dielectric.emplace_back("thin_film_weight", yamlNumber(factor));
+    surface.dielectric.emplace_back("thin_film_thickness", yamlNumber(thickness / 1000));
+    surface.dielectric.emplace_back(
+        "thin_film_ior", yamlNumber(std::clamp(gltfNumber(film, "iridescenceIor", 1.3), 1.0, 10.0)));
+    if (film.Has("iridescenceTexture") || film.Has("iridescenceThicknessTexture"))
+        losses_.add("textures of iridescence");
+}
+
+/// The surface, a dielectric, and a metal where a texture is bright enough. False where that texture cannot
+/// be used.
+bool GltfMaterials::writeByTexel(Source& source, Surface& surface, const GltfMetalParts& metal) {
+    const auto mask = usable(source, metal.mask, "the texture of specular colour");
+    if (!mask) return false;
+    Source other{metal.material, source.use, source.text, source.pointer, source.set};
+    Surface above;
+    readColor(other, above);
+    readMetal(other, above);
+    above.normal_map = surface.normal_map;
+    above.layers = surface.layers;
+    const std::string& name = source.text.name;
+    const std::string below_name = names_.take(name + " (dielectric)", ""),
+                      above_name = names_.take(name + " (metal)", "");
+    const std::string opacity = std::exchange(surface.opacity, {});
+    write(below_name, surface);
+    write(above_name, above);
+    add(name, {{"type", "mix"},
+               {"materials", fmt::format("[{}, {}]", yamlText(below_name), yamlText(above_name))},
+               {"amount", textures_.form(
+                              *mask, fmt::format(", channel: green, cutoff: {}", yamlNumber(metal.cutoff)))},
+               {"opacity", opacity}});
+    return true;
 }
 
 }  // namespace crt

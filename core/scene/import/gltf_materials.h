@@ -17,16 +17,23 @@ struct GltfMaterialUse {
     int material = -1;     ///< −1: glTF's own.
     bool colors = false;   ///< COLOR_0.
     unsigned uv_sets = 0;  ///< Bit n: TEXCOORD_n.
+    /// The least and the most of COLOR_0, where the material has opacity.
+    std::array<double, 2> alpha{1, 1};
 
     auto operator<=>(const GltfMaterialUse&) const = default;
 };
+
+struct GltfMetalParts;
 
 /// What an object needs to have such a material.
 struct GltfMaterialText {
     std::string name;
     std::size_t uv_set = 0;
     std::array<double, 3> color_factor{1, 1, 1};
-    std::string emission;  ///< Of the object; empty: none.
+    std::string emission;         ///< Of the object; empty: none.
+    bool vertex_opacity = false;  ///< It asks for opacities in place of texture coordinates.
+    bool normal_map = false;
+    double mirrors = 0;  ///< Share of the surface that sends light on in single directions alone.
 };
 
 class GltfMaterials {
@@ -52,6 +59,7 @@ private:
     void readColor(Source& source, Surface& surface);
     void readMetal(Source& source, Surface& surface);
     void readOpacity(Source& source, Surface& surface);
+    void readVertexOpacity(Source& source, Surface& surface);
     void readNormals(Source& source, Surface& surface);
     void readDielectric(Source& source, Surface& surface);
     void readClear(Source& source, Surface& surface);
@@ -59,8 +67,11 @@ private:
     void readFuzz(Source& source, Surface& surface);
     void readEmission(Source& source);
     bool readUnlit(Source& source);
+    void read(Source& source, Surface& surface);
+    void readIridescence(const Source& source, Surface& surface);
     void add(const std::string& name, const Keys& keys);
-    void write(Source& source, const Surface& surface);
+    void write(const std::string& name, const Surface& surface);
+    bool writeByTexel(Source& source, Surface& surface, const GltfMetalParts& metal);
 
     GltfFile& file_;
     GltfTextures& textures_;

@@ -32,4 +32,6 @@ std::array<double, 3> gltfColor(const Value& object, const char* key,
     return color;
 }
 
+double gltfLargest(const std::array<double, 3>& color) { return std::max({color[0], color[1], color[2]}); }
+
 }  // namespace crt

@@ -16,4 +16,6 @@ double gltfNumber(const tinygltf::Value& object, const char* key, double fallbac
 std::array<double, 3> gltfColor(const tinygltf::Value& object, const char* key,
                                 const std::array<double, 3>& fallback);
 
+double gltfLargest(const std::array<double, 3>& color);
+
 }  // namespace crt

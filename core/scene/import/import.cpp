@@ -49,6 +49,16 @@ void requireUtf8(const std::string& path, std::string_view name) {
                 {path});
 }
 
+/// In a scene a mesh that shows nothing is left out; here it is all that there is.
+std::unique_ptr<LoadedMesh> visibleMesh(LoadedMesh mesh, const std::string& path) {
+    if (mesh.mesh.triangles.empty())
+        throw Error(
+            ErrorKind::Scene,
+            fmt::format("{}: error: no face of this mesh has an area: there is nothing to see", path),
+            {path});
+    return std::make_unique<LoadedMesh>(std::move(mesh));
+}
+
 }  // namespace
 
 bool isModel(const std::string& path) {
@@ -90,10 +100,10 @@ ImportedModel importModel(GltfFiles& files, const std::string& path, const Impor
     std::string about;
     std::unique_ptr<LoadedMesh> mesh;
     if (extensionOf(path) == ".obj") {
-        mesh = std::make_unique<LoadedMesh>(loadObj(path));
+        mesh = visibleMesh(loadObj(path), path);
         body = objScene(*mesh, name, losses);
     } else if (extensionOf(path) == ".ply") {
-        mesh = std::make_unique<LoadedMesh>(loadPly(path));
+        mesh = visibleMesh(loadPly(path), path);
         body = plyScene(mesh->mesh, name, losses);
     } else {
         GltfFile& gltf = files.open(path);

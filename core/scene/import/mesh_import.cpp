@@ -1,8 +1,11 @@
 #include "scene/import/mesh_import.h"
 
+#include "scene/light_units.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <numbers>
 #include <optional>
 #include <vector>
 
@@ -29,13 +32,46 @@ std::optional<InnerView> innerViewOf(const Mesh& mesh, double aspect) {
     return innerView(triangles, aspect);
 }
 
-/// Camera and film; and light, unless the file has some.
-std::string viewText(const Mesh& mesh, bool emits, Losses& losses) {
+/// What the lamps of an OBJ (Ke) make of a white surface within its box, roughly, where 1 is white in the
+/// image; nothing where there are none.
+std::optional<double> brightnessBy(const LoadedMesh& loaded) {
+    const Mesh& mesh = loaded.mesh;
+    std::vector<double> radiance;
+    bool emits = false;
+    for (const LoadedMaterial& material : loaded.materials) {
+        const bool lamp = material.mtl && material.mtl->emission;
+        radiance.push_back(lamp ? photometric(material.mtl->emission->radiance) /
+                                      (kLuminousEfficacy_lm_W * cieYIntegral())
+                                : 0);
+        emits |= lamp;
+    }
+    if (!emits) return std::nullopt;
+    double light = 0;  // Times area.
+    for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+        const auto& corners = mesh.triangles[i];
+        const Vec3d& a = mesh.positions[corners[0]];
+        const double area =
+            length(cross(mesh.positions[corners[1]] - a, mesh.positions[corners[2]] - a)) / 2;
+        if (mesh.material[i] >= 0) light += area * radiance[static_cast<std::size_t>(mesh.material[i])];
+    }
+    const double radius = boundsOf(mesh).radius();
+    return light / (4 * std::numbers::pi * radius * radius);
+}
+
+/// Camera and film; and light, unless the file has enough.
+std::string viewText(const Mesh& mesh, const std::optional<double>& brightness, Losses& losses) {
+    constexpr double kAlmostBlack = 0.004;  // Code 13 of 255.
     constexpr double kAspect = 1.5;
     const std::optional<InnerView> inner = innerViewOf(mesh, kAspect);
     std::string text = chosenCamera(boundsOf(mesh), inner, kAspect, losses);
     text += "film: {resolution: [960, 640]}\nsampler: {samples: 128}\n";
-    if (emits) return text;
+    if (brightness && *brightness < kAlmostBlack) {
+        losses.choose(
+            "a grey sky beside the file's lights, which are too weak to show it (`--set environment=null` "
+            "leaves it out)");
+        return text + chosenSky("the lights of the file are too weak to show it", 1);
+    }
+    if (brightness) return text;
     losses.choose(inner ? "a grey sky and a lamp at the camera" : "a grey sky and a lamp");
     return text + chosenLight(inner);
 }
@@ -49,9 +85,7 @@ std::string objScene(const LoadedMesh& loaded, const std::string& file_name, Los
         std::any_of(loaded.mesh.material.begin(), loaded.mesh.material.end(), [&](std::int32_t m) {
             return m < 0 || !loaded.materials[static_cast<std::size_t>(m)].mtl;
         });
-    const bool emits = std::any_of(loaded.materials.begin(), loaded.materials.end(),
-                                   [](const LoadedMaterial& m) { return m.mtl && m.mtl->emission; });
-    std::string text = viewText(loaded.mesh, emits, losses);
+    std::string text = viewText(loaded.mesh, brightnessBy(loaded), losses);
     if (bare) {
         losses.choose("grey for faces without a material");
         text += "\nmaterials:\n  grey: {type: diffuse, reflectance: 0.5}\n";
@@ -69,7 +103,7 @@ std::string objScene(const LoadedMesh& loaded, const std::string& file_name, Los
 
 /// Of the colours of its vertices where it has some, else grey; smooth where it has no normals.
 std::string plyScene(const Mesh& mesh, const std::string& file_name, Losses& losses) {
-    std::string text = viewText(mesh, false, losses);
+    std::string text = viewText(mesh, std::nullopt, losses);
     const bool colored = !mesh.colors.empty();
     losses.choose(colored ? "a matt material of the colours of its vertices" : "a grey material");
     text += fmt::format("\nmaterials:\n  surface: {{type: diffuse, reflectance: {}}}\n",

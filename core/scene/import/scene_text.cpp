@@ -79,14 +79,18 @@ void Bounds::add(const Vec3d& point) {
 Vec3d Bounds::centre() const { return lower * 0.5 + upper * 0.5; }
 double Bounds::radius() const { return length(upper * 0.5 - lower * 0.5); }
 
+std::string chosenSky(const std::string& why, double brightness) {
+    constexpr double kSky = 0.5;
+    const double sky = kSky * brightness;
+    return fmt::format("\n# Chosen: {}.\nenvironment: {{radiance: {{rgb: {}, space: linear}}}}\n", why,
+                       yamlList(Vec3d{sky, sky, sky}));
+}
+
 std::string chosenLight(const std::optional<InnerView>& inner) {
     // The lamp's irradiance is 1.9, the sky's 1.6: a white surface has 1.1 towards the lamp and .5 away from
     // it, where the sky has .5.
     constexpr double kIrradiance = 1.9;
-    const std::string text =
-        "\n# Chosen: the file has no light.\n"
-        "environment: {radiance: {rgb: [0.5, 0.5, 0.5], space: linear}}\n"
-        "lights:\n";
+    const std::string text = chosenSky("the file has no light", 1) + "lights:\n";
     if (!inner)
         return text +
                "  - {name: key, type: sun, direction: [0.4, -0.75, -0.55], angular_diameter_deg: 20, "

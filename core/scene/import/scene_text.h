@@ -66,6 +66,10 @@ private:
     static constexpr double kNone = std::numeric_limits<double>::infinity();
 };
 
+/// The section of a grey sky of radiance 0.5, and its reason. `brightness`: factor, for an image that is
+/// exposed otherwise.
+std::string chosenSky(const std::string& why, double brightness);
+
 /// Light for a file that has none: a grey sky, which a white surface does not vanish into, and a soft lamp
 /// over the left shoulder of `chosenCamera`; within a building, where that may not reach, one at the camera.
 /// Both sections, as text.

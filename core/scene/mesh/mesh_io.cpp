@@ -40,7 +40,7 @@ public:
         material_index_.assign(obj_.material_names.size(), -1);
         makeTriangles();
         for (const Part& part : parts_) join(part);
-        if (triangles_ == 0) failForWantOfFaces();
+        if (triangles_ == 0) requireFaces();
         joinTriangles();
         finish();
         return std::move(out_);
@@ -196,11 +196,12 @@ private:
         });
     }
 
-    [[noreturn]] void failForWantOfFaces() const {
+    /// Faces without an area are enough, for what shows nothing but is sound.
+    void requireFaces() const {
         const MeshLoss& bad = obj_.bad_positions;
         if (bad.count > 0 && (faces_without_position_ > 0 || !any_faces_))
             failMesh(bad.sentence, path_, bad.line);
-        if (out_.degenerate_faces > 0) failMesh("no face of this mesh has an area", path_);
+        if (out_.degenerate_faces > 0) return;
         if (obj_.small_faces.count > 0) failMesh(obj_.small_faces.sentence, path_, obj_.small_faces.line);
         const std::vector<std::string> others = otherGeometry();
         if (!others.empty())
@@ -232,7 +233,7 @@ private:
         mesh.positions = std::move(obj_.positions);
         // No triangle names a vertex or normal that is no number, but all that is stored shall be one.
         for (Vec3d& p : mesh.positions)
-            if (!isNumber(p)) p = mesh.positions[mesh.triangles.front()[0]];
+            if (!isNumber(p)) p = somePosition(mesh);
         for (Vec3d& n : obj_.normals)
             if (!isNumber(n)) n = {0, 0, 0};
         if (any_smooth_) mesh.normals = std::move(obj_.normals);

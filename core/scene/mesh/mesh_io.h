@@ -28,7 +28,7 @@ struct LoadedMaterial {
 /// What the file of a mesh brought.
 struct LoadedMesh {
     Mesh mesh;  ///< mesh.material indexes `materials` below, −1 none, or is empty; mesh.emission is empty.
-    std::vector<LoadedMaterial> materials;   ///< Only those that faces use, in the order in which they do.
+    std::vector<LoadedMaterial> materials;  ///< Only those that faces use, in the order in which they do.
     std::vector<MeshPart> parts;  ///< Groups and objects of an OBJ, those that faces belong to among them.
     std::vector<std::int32_t>
         part;  ///< By triangle, index into `parts`, −1 none; empty where there are none.
@@ -38,10 +38,10 @@ struct LoadedMesh {
 };
 
 /// Reads an OBJ. Throws crt::Error(Scene) with file:line for a file that is missing, has another format, has
-/// no face that can be seen, or whose faces name vertices that are not there. What costs less than the file
-/// is a warning: faces of vertices that are no numbers (left out), of no area (left out), of normals that
-/// are not there or have no direction (shaded flat); names that no MTL defines; what crt has no place for.
-/// One line says what became of the materials.
+/// no face, or whose faces name vertices that are not there. What costs less than the file is a warning:
+/// faces of vertices that are no numbers (left out), of no area (left out, even if that leaves none), of
+/// normals that are not there or have no direction (shaded flat); names that no MTL defines; what crt has no
+/// place for. One line says what became of the materials.
 LoadedMesh loadObj(const std::string& path, const ObjOptions& options = {});
 
 }  // namespace crt

@@ -30,6 +30,10 @@ bool isDegenerate(const Vec3d& a, const Vec3d& b, const Vec3d& c) {
            4.0 * std::numeric_limits<double>::epsilon() * (1.0 + coordinate);
 }
 
+Vec3d somePosition(const Mesh& mesh) {
+    return mesh.triangles.empty() ? Vec3d{} : mesh.positions[mesh.triangles.front()[0]];
+}
+
 void normaliseNormals(std::vector<Vec3d>& normals) {
     constexpr std::size_t kNormals = std::size_t{1} << 14;
     parallelFor(normals.size(), kNormals, [&](std::size_t first, std::size_t end) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "base/vec3d.h"
+#include "scene/scene.h"
 
 #include <cmath>
 #include <cstdint>
@@ -44,6 +45,9 @@ inline bool isNumber(const Vec3d& v) { return !std::isnan(v[0]); }
 /// No area beyond what rounding the coordinates to double can make up: collinear points seldom give exactly
 /// zero.
 bool isDegenerate(const Vec3d& a, const Vec3d& b, const Vec3d& c);
+
+/// A position that triangles have; the origin where there are none.
+Vec3d somePosition(const Mesh& mesh);
 
 /// To unit length; those without a direction become NaN.
 void normaliseNormals(std::vector<Vec3d>& normals);

@@ -75,7 +75,7 @@ public:
 
     LoadedMesh take() {
         content_ = {};
-        if (triangles_ == 0) failForWantOfFaces();
+        if (triangles_ == 0) requireFaces();
         joinParts();
         repair();
         sayWhatIsLost();
@@ -333,17 +333,18 @@ private:
         Mesh& mesh = out_.mesh;
         if (losses_.bad_positions.count > 0)
             for (Vec3d& p : mesh.positions)
-                if (!isNumber(p)) p = mesh.positions[mesh.triangles.front()[0]];
+                if (!isNumber(p)) p = somePosition(mesh);
         for (Vec3d& n : mesh.normals)
             if (!isNumber(n)) n = {0, 0, 0};
     }
 
     // ---- Messages ----
 
-    [[noreturn]] void failForWantOfFaces() const {
+    /// Faces without an area are enough, for what shows nothing but is sound.
+    void requireFaces() const {
         const Losses& l = losses_;
         if (l.faces_without_position > 0) failMesh(l.bad_positions.sentence, path_, l.bad_positions.line);
-        if (l.degenerate > 0) failMesh("no face of this mesh has an area", path_);
+        if (l.degenerate > 0) return;
         if (l.small_faces.count > 0) failMesh(l.small_faces.sentence, path_, l.small_faces.line);
         failMesh(vertex_.count > 0 ? fmt::format("this mesh has no faces, only {} points", vertex_.count)
                                    : std::string("this mesh has no faces"),

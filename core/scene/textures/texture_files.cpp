@@ -286,6 +286,19 @@ std::array<std::uint16_t, 3> texelOf(const std::array<float, 3>& coefficients) {
             static_cast<std::uint16_t>(code(c[2] * unit * 0.25f, 8192) << 2 | e >> 2)};
 }
 
+std::shared_ptr<const TextureImage> numberRamp(double most) {
+    auto image = std::make_shared<TextureImage>();
+    image->file = "opacity of vertices";
+    image->width = 2;
+    image->height = 1;
+    image->kind = TexelKind::Numbers;
+    image->decode = [most](std::span<std::uint16_t> words) {
+        words[0] = 0;
+        words[1] = static_cast<std::uint16_t>(most * 65535 + 0.5);
+    };
+    return image;
+}
+
 std::shared_ptr<const TextureImage> TextureFiles::open(const std::string& path, const TexelUse& use) {
     std::error_code unknown;
     const std::string same = std::filesystem::weakly_canonical(path, unknown).string();
@@ -301,10 +314,12 @@ std::shared_ptr<const TextureImage> TextureFiles::open(const ImageSource& source
     return known;
 }
 
-std::shared_ptr<const TextureImage> TextureFiles::make(const ImageSource& source,
-                                                       const TexelUse& use) const {
+std::shared_ptr<const TextureImage> TextureFiles::make(const ImageSource& source, const TexelUse& use) {
     const std::string& path = source.name;
     const TexelsInfo info = texelsInfo(source);
+    const bool encoded = use.kind == TexelKind::Spectra && use.color != TexelColor::Linear;
+    for (const std::string& sentence : sentencesOf(info.tags, path, encoded))
+        if (told_.insert(sentence).second) logWarning("{}", sentence);
     if (use.kind == TexelKind::Spectra) (void)primariesToSrgb(info, path);  // refuses those it does not know
     if (use.kind == TexelKind::Normals && info.channels != 3)
         throw Error(ErrorKind::Scene,
@@ -317,14 +332,15 @@ std::shared_ptr<const TextureImage> TextureFiles::make(const ImageSource& source
     image->width = info.width;
     image->height = info.height;
     image->kind = use.kind;
-    image->decode = [source, use, width = info.width,
-                     height = info.height](std::span<std::uint16_t> words) {
+    image->decode = [source, use, width = info.width, height = info.height](std::span<std::uint16_t> words) {
         const std::string& file = source.name;
         const bool alpha = use.kind == TexelKind::Numbers && use.channel == kAlphaChannel;
-        const Texels texels = alpha ? readAlpha(source) : readTexels(source);
+        Texels texels = alpha ? readAlpha(source) : readTexels(source);
         if (texels.info.width != width || texels.info.height != height)
             throw Error(ErrorKind::Scene,
                         fmt::format("the image '{}' has changed since its header was read", file), {file});
+        if (use.kind == TexelKind::Spectra && texels.info.is_associated)
+            divideByAlpha(texels, readAlpha(source));
         if (use.kind == TexelKind::Spectra)
             encodeSpectra(texels, use, file, words);
         else if (use.kind == TexelKind::Normals)

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <set>
 #include <string>
 #include <tuple>
 
@@ -16,8 +17,8 @@ namespace crt {
 /// How the texels of a file are read.
 struct TexelUse {
     TexelKind kind = TexelKind::Spectra;
-    TexelColor color = TexelColor::Auto;  ///< Spectra. Numbers are taken as they are.
-    std::size_t channel = 0;              ///< Numbers: which of red, green, blue and alpha.
+    TexelColor color = TexelColor::Auto;    ///< Spectra. Numbers are taken as they are.
+    std::size_t channel = 0;                ///< Numbers: which of red, green, blue and alpha.
     std::array<double, 3> factor{1, 1, 1};  ///< In [0, 1], on linear colours; of numbers the first.
     double cutoff = -1;  ///< Numbers: 0 below it, 1 from it on, before the factor; below 0: as they are.
 
@@ -37,10 +38,14 @@ public:
     std::shared_ptr<const TextureImage> open(const ImageSource& source, const TexelUse& use);
 
 private:
-    std::shared_ptr<const TextureImage> make(const ImageSource& source, const TexelUse& use) const;
+    std::shared_ptr<const TextureImage> make(const ImageSource& source, const TexelUse& use);
 
     std::map<std::pair<std::string, TexelUse>, std::shared_ptr<const TextureImage>> open_;
+    std::set<std::string> told_;  ///< Warnings of what files say and crt does not apply: each once.
 };
+
+/// Numbers from 0 (u = 1/4) to `most` (u = 3/4), in two texels.
+std::shared_ptr<const TextureImage> numberRamp(double most);
 
 /// The three words of a texel that has this reflectance: its sigmoid's coefficients with an error of
 /// 2⁻¹⁵ to 2⁻¹³ of the power of two above the largest. Beyond ±8191, where the sigmoid is 0 or 1,

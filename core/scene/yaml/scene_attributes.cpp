@@ -20,7 +20,7 @@ namespace {
 
 /// What a texture needs of a mesh, that of its parts too.
 struct Needs {
-    bool uvs = false, colors = false;
+    bool uvs = false, colors = false, opacity = false;
 };
 
 Needs needsOf(const Scene& scene, TextureIndex index) {
@@ -31,7 +31,9 @@ Needs needsOf(const Scene& scene, TextureIndex index) {
         waiting.erase(waiting.begin());
         if (next == kNoTexture) continue;
         const Texture& texture = scene.textures[static_cast<std::size_t>(next)];
-        (texture.kind == Texture::Kind::VertexColors ? needs.colors : needs.uvs) = true;
+        (texture.kind == Texture::Kind::VertexColors ? needs.colors
+         : texture.of_opacity                        ? needs.opacity
+                                                     : needs.uvs) = true;
         for (const TextureValue& value : texture.values) waiting.insert(value.texture);
     }
     return needs;
@@ -43,6 +45,7 @@ Needs needsOf(const Scene& scene, const Material& material) {
     const auto add = [&](const Needs& more) {
         needs.uvs |= more.uvs;
         needs.colors |= more.colors;
+        needs.opacity |= more.opacity;
     };
     for (const TextureIndex texture : material.textures()) add(needsOf(scene, texture));
     for (const std::int32_t part : material.parts)
@@ -103,6 +106,17 @@ void ObjectReader::checkTextures(const SectionReader& section, const Object& obj
     for (const std::int32_t index : materials) {
         const Material& material = scene_.materials[static_cast<std::size_t>(index)];
         const Needs needs = needsOf(scene_, material);
+        if (needs.opacity && !mesh.uvs_are_opacity)
+            section.error(named,
+                          fmt::format("material '{}' asks for the opacity of vertices, but the mesh of {} "
+                                      "has none",
+                                      material.name, section.subject()),
+                          section.has("gltf") ? "write 'vertex_opacity: true' in the gltf" : "");
+        if (needs.uvs && mesh.uvs_are_opacity)
+            section.error(named,
+                          fmt::format("material '{}' has a texture, but the mesh of {} has opacities in "
+                                      "place of texture coordinates",
+                                      material.name, section.subject()));
         if (needs.uvs && mesh.uvs.empty() && !object.shape)
             section.error(named,
                           fmt::format("material '{}' has a texture, but the mesh of {} has no texture "

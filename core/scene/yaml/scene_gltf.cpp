@@ -30,7 +30,7 @@ void ObjectReader::tellGltf() const {
                    lost.primitives);
 }
 
-/// Nothing where it is wrong, which is told, and where nothing of it can be seen, which is warned of.
+/// Nothing where it is wrong, which is told.
 std::optional<std::uint32_t> ObjectReader::readGltf(const SectionReader& object) {
     const std::optional<SectionReader> form =
         object.section("gltf", fmt::format("the gltf of {}", object.subject()));
@@ -46,16 +46,13 @@ std::optional<std::uint32_t> ObjectReader::readGltf(const SectionReader& object)
     if (form->read("uv_set", number)) which.uv_set = number;
     if (std::vector<double> factor; form->read("color_factor", factor))
         which.color_factor = {factor[0], factor[1], factor[2]};
+    form->read("vertex_opacity", which.opacity);
     const std::optional<std::string> path = files_.locate(name, form->place("file"), out_);
     if (!path) return std::nullopt;
     const auto [known, fresh] = gltf_meshes_.try_emplace({*path, which, normals});
     if (!fresh) return known->second;
     try {
         Mesh mesh = gltfMesh(*form, *path, which);
-        if (mesh.triangles.empty()) {
-            logWarning("{} is left out: no triangle of it has an area", object.subject());
-            return std::nullopt;
-        }
         setNormals(mesh, normals, object.subject());
         known->second = static_cast<std::uint32_t>(scene_.meshes.size());
         scene_.meshes.push_back(std::move(mesh));

@@ -123,7 +123,8 @@ std::optional<std::uint32_t> ObjectReader::readMeshFile(const SectionReader& obj
         known->second = static_cast<std::uint32_t>(scene_.meshes.size());
         scene_.meshes.push_back(withSceneMaterials(*loaded, known->second, object, use));
     }
-    checkMaterials(object, *loaded, scene_.meshes[known->second], use);
+    if (const Mesh& mesh = scene_.meshes[known->second]; !mesh.triangles.empty())
+        checkMaterials(object, *loaded, mesh, use);
     return known->second;
 }
 

@@ -21,10 +21,22 @@ bool allFinite(const Matrix4d& m) {
 /// Rodrigues' rotation about a unit axis.
 Matrix4d rotation(const Vec3d& a, double degrees) {
     const double s = sineOfDegrees(degrees), c = cosineOfDegrees(degrees), t = 1 - c;
-    return {t * a[0] * a[0] + c,        t * a[0] * a[1] - s * a[2], t * a[0] * a[2] + s * a[1], 0,
-            t * a[0] * a[1] + s * a[2], t * a[1] * a[1] + c,        t * a[1] * a[2] - s * a[0], 0,
-            t * a[0] * a[2] - s * a[1], t * a[1] * a[2] + s * a[0], t * a[2] * a[2] + c,        0,
-            0,                          0,                          0,                          1};
+    return {t * a[0] * a[0] + c,
+            t * a[0] * a[1] - s * a[2],
+            t * a[0] * a[2] + s * a[1],
+            0,
+            t * a[0] * a[1] + s * a[2],
+            t * a[1] * a[1] + c,
+            t * a[1] * a[2] - s * a[0],
+            0,
+            t * a[0] * a[2] - s * a[1],
+            t * a[1] * a[2] + s * a[0],
+            t * a[2] * a[2] + c,
+            0,
+            0,
+            0,
+            0,
+            1};
 }
 
 /// A unit vector, also from components whose squares overflow or vanish.
@@ -427,6 +439,14 @@ void ObjectReader::readObjects(const YamlNode& list) {
     tellGltf();
 }
 
+void ObjectReader::tellLeftOut(const Object& object, const std::string& subject) const {
+    const bool emits =
+        object.emission >= 0 ||
+        (object.material >= 0 && scene_.materials[static_cast<std::size_t>(object.material)].emission >= 0);
+    logWarning("{}:{}:{}: {} is left out{}: no face of its mesh has an area", object.place.file,
+               object.place.line, object.place.column, subject, emits ? ", and its light with it" : "");
+}
+
 void ObjectReader::readObject(const YamlNode& node, const YamlPlace& place, std::size_t number) {
     const YamlEntry* name = node.find("name");
     const SectionReader section(out_, node, place, schemaSection("object"),
@@ -457,7 +477,6 @@ void ObjectReader::readObject(const YamlNode& node, const YamlPlace& place, std:
         mesh = readMeshFile(section, readMeshUse(section, material_name));
     } else if (section.has("gltf")) {
         mesh = readGltf(section);
-        if (!mesh) return;
     } else if (hasShape(section)) {
         mesh = readShape(section, object);
         refuseMeshKeys(section);
@@ -474,6 +493,8 @@ void ObjectReader::readObject(const YamlNode& node, const YamlPlace& place, std:
                           "a mesh that is written out has 'color_space'");
     }
     object.emission = readEmission(section, object.material, material_name).value_or(-1);
+    if (mesh && !object.shape && scene_.meshes[*mesh].triangles.empty())
+        return tellLeftOut(object, section.subject());
     object.mesh = mesh.value_or(0);
     if (mesh) checkTextures(section, object);
     scene_.objects.push_back(std::move(object));

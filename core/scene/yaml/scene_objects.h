@@ -75,6 +75,8 @@ private:
     void readOpenPbr(const SectionReader& section, Material& material);
     bool transmits(const Material& part) const;
     void readObject(const YamlNode& node, const YamlPlace& place, std::size_t number);
+    /// Warns of an object whose mesh shows nothing.
+    void tellLeftOut(const Object& object, const std::string& subject) const;
     MeshUse readMeshUse(const SectionReader& object, const std::string& material);
     void refuseObjKeys(const SectionReader& object) const;
     void refuseMeshKeys(const SectionReader& object) const;
@@ -133,7 +135,7 @@ private:
     std::map<std::pair<const YamlNode*, NormalsUse>, std::optional<std::uint32_t>> written_meshes_;
     std::map<const YamlNode*, std::optional<Matrix4d>> written_placements_;
     ExpansionLimit limit_;
-    std::uint64_t placements_ = 0, triangles_ = 0;           ///< Read so far.
+    std::uint64_t placements_ = 0, triangles_ = 0;  ///< Read so far.
     std::unique_ptr<LoadedMesh> offered_;
     std::map<FileUse, std::unique_ptr<LoadedMesh>> loaded_;  ///< Null for a file that failed.
     std::map<std::pair<FileUse, std::vector<PartUse>>, std::uint32_t> meshes_;

@@ -45,6 +45,11 @@ void addGltf(std::vector<SectionSchema>& all) {
            .range = {0, 1, false, false},
            .fallback = "[1, 1, 1]",
            .doc = "Factor on the colours of vertices, linear [r, g, b]."},
+          {.name = "vertex_opacity",
+           .kind = Kind::Boolean,
+           .fallback = "false",
+           .doc = "The alpha of the colours of vertices is there for `{attribute: opacity}`, in place of "
+                  "texture coordinates."},
           {.name = "allow_outside",
            .kind = Kind::Boolean,
            .fallback = "false",

@@ -56,7 +56,10 @@ void addTextures(std::vector<SectionSchema>& all) {
          {{.name = "texture",
            .required = true,
            .doc = "A PNG, JPEG, TGA, EXR, Radiance HDR or PFM, by content; looked up beside the scene, then "
-                  "in CRT_MESH_PATH. Or a glTF file or GLB, with `image`."},
+                  "in CRT_MESH_PATH. Or a glTF file or GLB, with `image`. Colours of an EXR with alpha, "
+                  "which are multiplied by it, are divided by it. EXPOSURE of an HDR, gAMA of a PNG and the "
+                  "EXIF orientation of a JPEG are ignored, with a warning where they would change the "
+                  "picture."},
           {.name = "image",
            .kind = Kind::Integer,
            .range = {0, 1e9, false, false},
@@ -118,9 +121,19 @@ void addTextures(std::vector<SectionSchema>& all) {
                    "Values at the vertices of a mesh, with linear interpolation at every wavelength.",
                    {{.name = "attribute",
                      .kind = Kind::Choice,
-                     .choices = {"colors"},
+                     .choices = {"colors", "opacity"},
                      .required = true,
-                     .doc = "`colors` of a mesh that is written out."}}});
+                     .doc = "`colors` of a mesh that is written out, of a PLY or of a gltf; for a number "
+                            "`opacity`, of a gltf with `vertex_opacity`."},
+                    {.name = "factor",
+                     .kind = Kind::Number,
+                     .range = {0, 1, false, false},
+                     .fallback = "1",
+                     .doc = "Factor on opacities."},
+                    {.name = "cutoff",
+                     .kind = Kind::Number,
+                     .range = {0, 1, false, false},
+                     .doc = "Opacities below it are 0, those from it on are 1, before `factor`."}}});
 }
 
 }  // namespace crt

@@ -51,16 +51,52 @@ std::optional<TextureIndex> TextureReader::readForm(const YamlNode& node, const 
     } else if (word == "checker") {
         texture = readChecker(*form, row, kind);
     } else {
-        texture.emplace().kind = Texture::Kind::VertexColors;
-        if (kind == TexelKind::Numbers) {
-            form->error("attribute",
-                        fmt::format("{} is a number, and colours of vertices are colours", what));
-            return std::nullopt;
-        }
+        texture = readAttribute(*form, what, kind);
     }
     if (!texture) return std::nullopt;
     texture->place = place.resolved();
     return written_[{&node, kind}] = add(*std::move(texture));
+}
+
+std::optional<Texture> TextureReader::readAttribute(const SectionReader& form, const std::string& what,
+                                                    TexelKind kind) const {
+    std::string attribute;
+    if (!form.readWord("attribute", attribute)) return std::nullopt;
+    const bool colors = attribute == "colors";
+    if (colors == (kind == TexelKind::Numbers)) {
+        form.error("attribute",
+                   colors ? fmt::format("{} is a number, and colours of vertices are colours", what)
+                          : fmt::format("{} is a colour, and opacities of vertices are numbers", what));
+        return std::nullopt;
+    }
+    if (!colors) return opacityOfVertices(form);
+    for (const char* key : {"cutoff", "factor"})
+        if (form.has(key)) form.error(key, "this is about opacities; colours are taken as they are");
+    Texture texture;
+    texture.kind = Texture::Kind::VertexColors;
+    return texture;
+}
+
+/// The opacity as u of two texels: linear from the middle of one to that of the other, or with a cutoff the
+/// one or the other.
+Texture TextureReader::opacityOfVertices(const SectionReader& form) {
+    constexpr double kFirstMiddle = 0.25, kBetweenMiddles = 0.5, kEdge = 0.5;
+    constexpr double kRounding =
+        1e-6;  // An opacity that is the cutoff is there, whatever floats make of it.
+    double factor = 1, cutoff = -1;
+    form.read("factor", factor);
+    form.read("cutoff", cutoff);
+    Texture texture;
+    texture.image = numberRamp(factor);
+    texture.wrap = TextureWrap::Clamp;
+    texture.of_opacity = true;
+    if (cutoff < 0) {
+        texture.transform = {kBetweenMiddles, 0, kFirstMiddle, 0, 1, 0};
+    } else {
+        texture.filter = TextureFilter::Nearest;
+        texture.transform = {1, 0, kEdge - cutoff + kRounding, 0, 1, 0};
+    }
+    return texture;
 }
 
 /// (u, v) is scaled, turned and moved, in this order: a scale of 4 puts four images side by side.

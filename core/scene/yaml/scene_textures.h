@@ -41,6 +41,9 @@ private:
     std::optional<TextureIndex> readForm(const YamlNode& node, const YamlPlace& place,
                                          const std::string& what, const KeySchema& row, TexelKind kind);
     std::optional<Texture> readImage(const SectionReader& form, TexelKind kind);
+    std::optional<Texture> readAttribute(const SectionReader& form, const std::string& what,
+                                         TexelKind kind) const;
+    static Texture opacityOfVertices(const SectionReader& form);
     std::shared_ptr<const TextureImage> openImage(const SectionReader& form, const TexelUse& use);
     void readFactor(const SectionReader& form, TexelUse& use) const;
     std::optional<Texture> readChecker(const SectionReader& form, const KeySchema& row, TexelKind kind);

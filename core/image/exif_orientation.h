@@ -1,0 +1,13 @@
+/// Which way up a camera held its pixels. Part of the image module (image_module.h).
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+
+namespace crt::image {
+
+/// The orientation that a block of EXIF says, 1 (as the pixels lie) to 8; 0 where it says none, or the block
+/// is damaged. `exif`: from the mark of its byte order on.
+std::uint32_t exifOrientation(std::string_view exif);
+
+}  // namespace crt::image
