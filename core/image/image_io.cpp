@@ -4,6 +4,7 @@
 #include "base/error.h"
 #include "base/host.h"
 #include "base/input_file.h"
+#include "base/log.h"
 #include "image/image_metadata.h"
 #include "image/image_module.h"
 #include "image/open_module.h"

@@ -3,8 +3,11 @@ time and memory that do not run away."""
 
 import gzip
 import os
+import pathlib
 import re
 import struct
+import subprocess
+import sys
 import zlib
 
 import pytest
@@ -15,6 +18,7 @@ from crt import Kind
 MITSUBA = '<scene version="3.0.0"><sensor type="perspective"/>%s</scene>'
 PBRT = 'Camera "perspective"\nWorldBegin\n%s\n'
 GLOW = '<emitter type="constant"><blackbody name="radiance" temperature="{}"/></emitter>'
+FUZZER = pathlib.Path(__file__).resolve().parents[2] / "tests" / "fuzz" / "importers.py"
 TWICE = 40  # Each names the next twice: 2^40 ways.
 
 
@@ -121,6 +125,13 @@ def test_spectra_are_files(tmp_path):
         (tmp_path / "s.xml").write_text(
             MITSUBA % f'<shape type="sphere"><bsdf type="diffuse">{spectrum}</bsdf></shape>')
         assert "it is no file" in refused(tmp_path / "s.xml")
+
+
+def test_mutations_of_scenes_are_refused_in_a_sentence(tmp_path):
+    done = subprocess.run([sys.executable, FUZZER, "--mutations", "40", "--findings", tmp_path],
+                          capture_output=True, text=True, timeout=900)
+    said = done.stdout + done.stderr
+    assert done.returncode == 0 and " 40 mutations each: 0 findings" in said, said
 
 
 def test_many_materials_without_a_name_take_linear_time(tmp_path):
