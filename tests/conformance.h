@@ -17,7 +17,8 @@ namespace conformance {
 /// The backend named by --backend.
 const crt::LoadedBackend& backend();
 /// The backend that others are compared with, bit by bit: --against, by default the portable C++ build of
-/// the kernel (`example`).
+/// the kernel (`example`), and where that is not installed, or is the one under test, the first of crt's own
+/// that runs here.
 const crt::LoadedBackend& reference();
 
 /// A scene from YAML; meshes only inline.
@@ -30,8 +31,8 @@ struct Run {
     std::uint32_t aovs = 0;
 };
 
-/// --one-kernel: the backend under test has the full kernel and no other.
-bool oneKernel();
+/// --lean-kernels: the backend under test has other kernels than the full one, and must use them.
+bool leanKernels();
 
 /// Compiles, opens, renders, reads back.
 crt::Film render(const crt::LoadedBackend& backend, const crt::Scene& scene, const Run& run,

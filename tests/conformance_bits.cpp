@@ -749,6 +749,7 @@ TEST_CASE("the same bits as the portable build of the kernel", "[bits]") {
 }
 
 TEST_CASE("a kernel with everything in it gives the bits of the lean one", "[bits]") {
+    bool lean_differs = false;
     for (const Named& n : allScenes()) {
         Run lean, full;
         lean.samples = full.samples = 4;
@@ -762,8 +763,11 @@ TEST_CASE("a kernel with everything in it gives the bits of the lean one", "[bit
         const std::uint64_t needed = crt::compileScene(n.scene, 0).features;
         CHECK((needed & ~of_lean.kernel_features) == 0);
         // Otherwise one kernel was compared with itself.
-        if (n.plain && !oneKernel()) CHECK(of_lean.kernel_features != of_full.kernel_features);
+        if (n.plain && leanKernels()) CHECK(of_lean.kernel_features != of_full.kernel_features);
+        lean_differs = lean_differs || of_lean.kernel_features != of_full.kernel_features;
     }
+    if (!lean_differs)
+        WARN("the backend has one kernel for all scenes, so there was nothing to compare it with");
 }
 
 TEST_CASE("threads and tiles do not show", "[bits]") {

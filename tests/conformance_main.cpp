@@ -1,4 +1,5 @@
-// conformance --backend NAME [--against NAME] [--one-kernel] [Catch2 options]: one suite for every backend.
+// conformance --backend NAME [--against NAME] [--lean-kernels] [Catch2 options]: one suite for every
+// backend.
 // Exit code 77 and one sentence when the backend cannot run here, so that a machine without a GPU skips
 // visibly.
 #include "conformance.h"
@@ -10,14 +11,38 @@
 
 #include <cstdio>
 #include <memory>
+#include <optional>
 
 namespace conformance {
 namespace {
 
 std::string backend_name = "embree";
-std::string reference_name = "example";
-bool one_kernel = false;
+std::string reference_name;
+bool lean_kernels = false;
 constexpr int kSkipped = 77;
+
+/// The backend of that name, where it is another than the one under test and runs here.
+std::optional<crt::LoadedBackend> other(const char* name) {
+    try {
+        crt::LoadedBackend loaded = crt::loadBackend(name);
+        if (loaded.name == backend().name) return std::nullopt;
+        crt::probeDevices(loaded);
+        return loaded;
+    } catch (const crt::Error&) {
+        return std::nullopt;  // Perhaps the next.
+    }
+}
+
+crt::LoadedBackend chooseReference() {
+    for (const char* name : {"example", "embree", "opencl", "cuda"})
+        if (std::optional<crt::LoadedBackend> found = other(name)) {
+            std::printf("bits are compared with those of '%s'; --against names another\n",
+                        found->name.c_str());
+            return *found;
+        }
+    throw crt::Error(crt::ErrorKind::Backend,
+                     "no other backend can run here, to compare bits with; name one with --against");
+}
 
 }  // namespace
 
@@ -27,7 +52,8 @@ const crt::LoadedBackend& backend() {
 }
 
 const crt::LoadedBackend& reference() {
-    static const crt::LoadedBackend loaded = crt::loadBackend(reference_name);
+    static const crt::LoadedBackend loaded =
+        reference_name.empty() ? chooseReference() : crt::loadBackend(reference_name);
     return loaded;
 }
 
@@ -35,7 +61,7 @@ crt::Scene sceneFrom(const std::string& yaml, const std::vector<crt::SceneOverri
     return crt::parseScene(yaml, "conformance.yaml", ".", overrides);
 }
 
-bool oneKernel() { return one_kernel; }
+bool leanKernels() { return lean_kernels; }
 
 crt::Film render(const crt::LoadedBackend& with, const crt::Scene& scene, const Run& run,
                  CrtBackendReport* report) {
@@ -88,6 +114,6 @@ int main(int argc, char** argv) {
         argc, argv,
         {{"--backend", "backend under test, or a path to its .so", &conformance::backend_name},
          {"--against", "backend to compare bits with", &conformance::reference_name},
-         {"--one-kernel", "the backend has no lean kernels to compare", nullptr, &conformance::one_kernel}},
+         {"--lean-kernels", "the backend must have lean kernels", nullptr, &conformance::lean_kernels}},
         probe);
 }

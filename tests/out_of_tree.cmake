@@ -1,6 +1,6 @@
 # The road of somebody who writes a backend: install crt, move the tree to where he wants it, build
-# docs/example_backend against it, and see that it is usable and passes the ABI part of the conformance
-# suite. Nothing of the source or build tree of crt is used after the install but that suite.
+# docs/example_backend against it, and see that it is usable and passes the conformance suite. Nothing of the
+# source or build tree of crt is used after the install but that suite.
 #
 #   cmake -DSOURCE_DIR=… -DBUILD_DIR=… -DWORK_DIR=… -DGENERATOR=… -DCXX_COMPILER=…
 #     [-DCXX_FLAGS=…] -P out_of_tree.cmake
@@ -29,6 +29,16 @@ run(${CMAKE_COMMAND} -E env CRT_BACKEND_PATH=${WORK_DIR}/build ${BUILD_DIR}/bin/
   example --against example "[abi]")
 if(NOT output MATCHES "All tests passed")
   message(FATAL_ERROR "the out-of-tree backend was not tested:\n${output}")
+endif()
+
+# Its bits against those of another backend, as its README says: nobody names that other one, nor that this
+# one has a single kernel.
+if(EXISTS ${BUILD_DIR}/lib/crt/crt_backend_embree.so)
+  run(${CMAKE_COMMAND} -E env CRT_BACKEND_PATH=${WORK_DIR}/build ${BUILD_DIR}/bin/crt_conformance --backend
+    example "the same bits as*,a kernel with everything*")
+  if(NOT output MATCHES "All tests passed" OR NOT output MATCHES "those of 'embree'")
+    message(FATAL_ERROR "the bits of the out-of-tree backend were not tested:\n${output}")
+  endif()
 endif()
 
 # And physics, by the crt that was installed.

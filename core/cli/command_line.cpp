@@ -145,6 +145,15 @@ public:
         return chosen_;
     }
 
+    /// What was given to the command without an option's name before it.
+    std::vector<std::string> words(const Command& command) const {
+        std::vector<std::string> words;
+        for (const CLI::Option* option : app_.get_subcommand(command.name)->get_options())
+            if (option->get_positional())
+                words.insert(words.end(), option->results().begin(), option->results().end());
+        return words;
+    }
+
 private:
     void addCommand(const Command& command) {
         CLI::App* app = app_.add_subcommand(command.name, command.summary);
@@ -249,6 +258,13 @@ bool isForeignScene(const std::string& word) {
     return !otherRendererOf(word).empty() && std::filesystem::is_regular_file(word, unknown);
 }
 
+/// Where the Python package, which knows no options, looks for it: right behind the command.
+std::vector<std::string> sceneFirst(std::vector<std::string> arguments, const std::string& scene) {
+    const auto found = std::find(arguments.begin() + 1, arguments.end(), scene);
+    if (found != arguments.end()) std::rotate(arguments.begin() + 1, found, found + 1);
+    return arguments;
+}
+
 std::vector<std::string> namesOf(const std::vector<Command>& commands) {
     std::vector<std::string> names;
     for (const Command& command : commands) names.push_back(command.name);
@@ -279,10 +295,12 @@ int CommandLine::run(const std::vector<std::string>& words) const {
     if (arguments.empty())
         throw Error(ErrorKind::Usage,
                     "there is no scene to render; try 'crt configs/cornell_box.yaml', or 'crt --help'");
-    const Command* command = Parser(commands_).parse(arguments);
+    Parser parser(commands_);
+    const Command* command = parser.parse(arguments);
     if (command == nullptr) return 0;
-    if (takesScenes(*command) && std::any_of(arguments.begin(), arguments.end(), isForeignScene))
-        becomePythonPackage(arguments);  // Without it the command says what is missing.
+    if (const std::vector<std::string> named = parser.words(*command);
+        takesScenes(*command) && !named.empty() && isForeignScene(named.front()))
+        becomePythonPackage(sceneFirst(arguments, named.front()));  // Returns where there is none.
     return command->run(shellLine(words));
 }
 

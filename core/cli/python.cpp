@@ -15,14 +15,14 @@ extern char** environ;
 namespace crt {
 namespace {
 
-/// Ends with code 0 where there is a package crt, and it is this one: PyPI has another of the name. What
-/// lies in the working directory is not run.
+/// Ends with code 0 where there is a package crt that imports scenes of others: PyPI has another package of
+/// the name. What lies in the working directory is not run.
 constexpr const char* kPackageIsThere =
     "import importlib.util, os, sys\n"
     "sys.path[:] = [folder for folder in sys.path if folder]\n"
     "found = importlib.util.find_spec('crt')\n"
     "places = found and found.submodule_search_locations or []\n"
-    "sys.exit(not any(os.path.isdir(os.path.join(place, 'importers')) for place in places))\n";
+    "sys.exit(not any(os.path.isfile(os.path.join(place, 'foreign_scenes.py')) for place in places))\n";
 
 /// python -m crt, but for the working directory.
 constexpr const char* kRunPackage =

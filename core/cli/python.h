@@ -19,8 +19,9 @@ struct EndedProgram {
 /// Runs it and waits, without input and without its output.
 EndedProgram runProgram(std::vector<std::string> words);
 
-/// Puts `python -m crt ARGUMENTS` in the place of this process; does not return then. Returns where that
-/// Python has no package crt of this project. The package runs this very program in turn.
+/// Puts `python -m crt ARGUMENTS`, a command and a scene of another renderer, in the place of this process;
+/// does not return then. Returns where that Python has no package that takes them. The package imports the
+/// scene and runs this very program in turn.
 void becomePythonPackage(const std::vector<std::string>& arguments);
 
 }  // namespace crt

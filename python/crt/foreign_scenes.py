@@ -13,13 +13,13 @@ CLEANER = "import shutil, sys; sys.stdin.read(); shutil.rmtree(sys.argv[1], igno
 
 
 def with_imported(arguments):
-    """The arguments with the first scene of another renderer among them as a scene of crt: imported into a
-    folder that is removed when this process, or the program that takes its place, ends. Where there is none
-    they are what they were. Raises crt.Error as import_scene."""
-    for i, word in enumerate(arguments):
-        if is_foreign(word) and os.path.isfile(word):
-            return [*arguments[:i], imported(word), *arguments[i + 1:]]
-    return arguments
+    """The arguments with a scene of another renderer, at their beginning or behind a command, as a scene of
+    crt: imported into a folder that is removed when this process, or the program that takes its place, ends.
+    Where there is none they are what they were. Raises crt.Error as import_scene."""
+    at = 0 if arguments[:1] and os.path.isfile(arguments[0]) else 1
+    if len(arguments) <= at or not is_foreign(arguments[at]) or not os.path.isfile(arguments[at]):
+        return arguments
+    return [*arguments[:at], imported(arguments[at]), *arguments[at + 1:]]
 
 
 def imported(path):

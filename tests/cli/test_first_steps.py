@@ -170,7 +170,10 @@ class OtherRenderers(CliTest):
             run = self.crt(*words, expect=3, CRT_PYTHON=python)
             implied = [] if command else ["render"]
             self.assertEqual(run.stdout.splitlines(), [os.path.realpath(harness.CRT), *implied, *words])
-        run = self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", CRT_PYTHON=python)
+        # The scene goes to the front, where the package looks, and values of options are no scenes.
+        run = self.crt("--spp", "2", "other.xml", "-q", expect=3, CRT_PYTHON=python)
+        self.assertEqual(run.stdout.splitlines()[1:], ["render", "other.xml", "--spp", "2", "-q"])
+        run = self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", "--report", "other.xml", CRT_PYTHON=python)
         self.assertEqual(run.stdout, "")
         # A command line that is wrong is told before.
         self.assertEqual(self.crt("other.xml", "--ssp", "3", expect=2, CRT_PYTHON=python).stdout, "")
