@@ -135,6 +135,22 @@ TEST_CASE("tables that take too long are refused with the place and what allows 
         CHECK(refusal(sceneOf(4, one)).empty());
         CHECK(refusal(sceneOf(4000, [&](int) { return one(0); })).empty());
     }
+    // A few are made however long they take, as models of glass have them.
+    const auto slow = [](int i) {
+        return fmt::format("{{type: rough_dielectric, ior: {{cauchy: [1.5, 0.01]}}, roughness: 0.{}, "
+                           "roughness_anisotropy: 0.5}}",
+                           200 + i);
+    };
+    for (const auto& [count, is_refused] : {std::pair{9, false}, {40, true}}) {
+        TableWork work;
+        const Scene scene = parseScene(sceneOf(count, slow), "s.yaml", ".");
+        countCompensations(addressesOf(scene.materials), work);
+        CHECK(work.seconds() > kMostTableSeconds);
+        if (is_refused)
+            CHECK_THROWS_WITH(work.requireBounded(), Contains("set CRT_TABLE_SECONDS="));
+        else
+            CHECK_NOTHROW(work.requireBounded());
+    }
 
     ::setenv("CRT_TABLE_SECONDS", "0.0001", 1);
     CHECK_THAT(refusal(sceneOf(1, glass)), Contains("s.yaml:5:"));

@@ -8,15 +8,17 @@
 #include <charconv>
 #include <cmath>
 #include <cstdlib>
+#include <optional>
 #include <string>
 #include <string_view>
 
 namespace crt {
 namespace {
 
-double mostSeconds() {
+/// As the environment has it, or nothing.
+std::optional<double> allowedSeconds() {
     const char* const text = std::getenv("CRT_TABLE_SECONDS");
-    if (text == nullptr || *text == '\0') return kMostTableSeconds;
+    if (text == nullptr || *text == '\0') return std::nullopt;
     const std::string_view all(text);
     double seconds = 0;
     const auto [end, problem] = std::from_chars(all.data(), all.data() + all.size(), seconds);
@@ -39,12 +41,15 @@ void TableWork::add(double steps, const Material& material) {
 }
 
 void TableWork::requireBounded() const {
-    if (seconds() <= mostSeconds()) return;
+    const std::optional<double> allowed = allowedSeconds();
+    if (!allowed && tables_ <= kFewTables) return;
+    const double most = allowed.value_or(kMostTableSeconds);
+    if (seconds() <= most) return;
     throw Error(ErrorKind::Scene,
                 fmt::format("{}: error: the scene has {} rough materials that differ in roughness, index or "
                             "anisotropy; their tables take {} of a processor, and a scene may take {}; give "
                             "materials the same values, or set CRT_TABLE_SECONDS={:.0f} to allow it",
-                            at(last_->place), tables_, durationText(seconds()), durationText(mostSeconds()),
+                            at(last_->place), tables_, durationText(seconds()), durationText(most),
                             std::ceil(seconds())),
                 last_->place);
 }

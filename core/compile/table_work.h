@@ -13,8 +13,8 @@ public:
     /// One more table, of so many steps: directions of microfacets, most often.
     void add(double steps, const Material& material);
 
-    /// Throws crt::Error(Scene) where the tables would take longer than kMostTableSeconds, or than the
-    /// environment variable CRT_TABLE_SECONDS allows; crt::Error(Usage) when that is no number.
+    /// Throws crt::Error(Scene) where more than kFewTables would take longer than kMostTableSeconds, or any
+    /// longer than the environment variable CRT_TABLE_SECONDS allows; crt::Error(Usage) when that is no number.
     void requireBounded() const;
 
     double seconds() const { return steps_ * kSecondsPerStep; }
@@ -30,5 +30,8 @@ private:
 
 /// Of one processor. Scenes of hundreds of materials stay far below it.
 inline constexpr double kMostTableSeconds = 6;
+
+/// So many tables are always made: the slowest, of dispersive glass, take a second each.
+inline constexpr std::size_t kFewTables = 9;
 
 }  // namespace crt
