@@ -14,7 +14,8 @@ public:
     void add(double steps, const Material& material);
 
     /// Throws crt::Error(Scene) where more than kFewTables would take longer than kMostTableSeconds, or any
-    /// longer than the environment variable CRT_TABLE_SECONDS allows; crt::Error(Usage) when that is no number.
+    /// longer than the environment variable CRT_TABLE_SECONDS allows; crt::Error(Usage) when that is no
+    /// number.
     void requireBounded() const;
 
     double seconds() const { return steps_ * kSecondsPerStep; }
