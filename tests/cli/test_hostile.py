@@ -29,6 +29,7 @@ import zlib
 
 import harness
 import hostile_models
+import hostile_values
 import hostile_work
 
 SECONDS = 10            # Of processor time; longer is a hang.
@@ -2037,6 +2038,7 @@ def main():
         scene_cases()
         hostile_work.material_cases(case)
         hostile_work.light_cases(case)
+        hostile_values.add(case)
         hostile_work.name_cases(case, good, os.path.join(FAKE, "crt_backend_fake.so"))
         mesh_cases()
         model_cases()
