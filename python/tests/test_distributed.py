@@ -195,9 +195,12 @@ def test_checkpoint_of_another_scene_is_kept(client, box, tmp_path):
     other["sampler.seed"] = 5
     crt.render(other, spp=16, backend="embree").save(path)
     before = path.read_bytes()
-    # Before the first sample, and not at the first checkpoint: progress would fail with another error.
+    done = [0]
+    # With the first part, and not at a checkpoint: none is due before the end.
     with pytest.raises(crt.Error) as refused:
-        crt.distributed.render(box, client, spp=1 << 20, checkpoint=path, on_progress=fail, **ONE)
+        crt.distributed.render(box, client, spp=1 << 18, checkpoint=path, checkpoint_every=1e9,
+                               on_progress=lambda now: done.append(now["fraction"]), **ONE)
+    assert max(done) < 0.5
     assert refused.value.kind == crt.Kind.USAGE and path.read_bytes() == before
 
 
