@@ -42,7 +42,7 @@ inline Imported importOf(const GltfMaker& maker) {
     } catch (const Error& e) {
         FAIL(result.text << "\n" << e.what());
     }
-    // What its textures are is seen when they are decoded.
+    // The decoder sees the contents of its textures.
     (void)compileScene(result.scene, 0);
     result.log = log.text();
     return result;

@@ -31,8 +31,8 @@ if(NOT output MATCHES "All tests passed")
   message(FATAL_ERROR "the out-of-tree backend was not tested:\n${output}")
 endif()
 
-# Its bits against those of another backend, as its README says: nobody names that other one, nor that this
-# one has a single kernel.
+# Its bits against those of another backend, as its README says: the command names neither that backend nor
+# that this one has a single kernel.
 if(EXISTS ${BUILD_DIR}/lib/crt/crt_backend_embree.so)
   run(${CMAKE_COMMAND} -E env CRT_BACKEND_PATH=${WORK_DIR}/build ${BUILD_DIR}/bin/crt_conformance --backend
     example "the same bits as*")

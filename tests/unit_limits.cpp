@@ -10,6 +10,7 @@
 #include "film/checkpoint.h"
 #include "image/image_io.h"
 #include "processor_time.h"
+#include "refusal.h"
 #include "base/temporary_folder.h"
 #include "render/output_guard.h"
 #include "scene/mesh/mesh_io.h"
@@ -29,21 +30,11 @@
 using namespace crt;
 using crt::TemporaryFolder;
 using crt::test::kSecondsAllowed;
+using crt::test::refusal;
 using crt::test::secondsOf;
 namespace fs = std::filesystem;
 
 namespace {
-
-/// The sentence of the crt::Error that `work` throws; empty when it throws none.
-template <class Work>
-std::string refusal(const Work& work) {
-    try {
-        work();
-    } catch (const Error& error) {
-        return error.what();
-    }
-    return {};
-}
 
 Film filmOf(std::uint64_t samples) {
     Film film({2, 1, channelsFor(0, 1), 0});

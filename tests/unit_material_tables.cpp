@@ -50,11 +50,7 @@ std::vector<const Material*> addressesOf(const std::vector<Material>& materials)
 }
 
 double secondsFor(const std::vector<const Material*>& materials) {
-    TableWork work;
-    countCoats(materials, work);
-    countRoughBases(materials, work);
-    countCompensations(materials, work);
-    return work.seconds();
+    return tableWorkOf(materials).seconds();
 }
 
 /// Spheres of `count` materials, each by its number.
@@ -142,9 +138,8 @@ TEST_CASE("tables that take too long are refused with the place and what allows 
                            200 + i);
     };
     for (const auto& [count, is_refused] : {std::pair{9, false}, {40, true}}) {
-        TableWork work;
         const Scene scene = parseScene(sceneOf(count, slow), "s.yaml", ".");
-        countCompensations(addressesOf(scene.materials), work);
+        const TableWork work = tableWorkOf(addressesOf(scene.materials));
         CHECK(work.seconds() > kMostTableSeconds);
         if (is_refused)
             CHECK_THROWS_WITH(work.requireBounded(), Contains("set CRT_TABLE_SECONDS="));

@@ -187,7 +187,7 @@ Words differencesOf(const std::string& path) {
     return words;
 }
 
-/// What is no number becomes NaN.
+/// Text that is not a number becomes NaN.
 std::vector<double> numbersIn(const std::string& text) {
     std::vector<double> numbers;
     std::istringstream words(text);
@@ -347,7 +347,7 @@ TEST_CASE("OBJ texts are what tinyobjloader reads, but for known differences", "
         INFO(text.text);
         check(differencesOf(folder.write("a.obj", kTriangle + text.text)), text.known);
     }
-    // What stands at the beginning of the file.
+    // The beginning of the file.
     const Known mark{{"areas", "positions"},
                      "the mark of UTF-8 is no part of the first line, which tinyobjloader loses"};
     check(differencesOf(folder.write("a.obj", "\xEF\xBB\xBF" + kTriangle + "f 1 2 3\n")), mark);

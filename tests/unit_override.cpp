@@ -73,7 +73,7 @@ TEST_CASE("null takes an optional key away, with what goes together with it", "[
     CHECK(with(lamp, {"objects.0.emission=null"}).objects[0].emission == -1);
     CHECK_FALSE(with("environment: {radiance: 1}\n", {"environment=null"}).environment);
 
-    // What must be there cannot go, and what is not there is not made.
+    // null does not remove required keys, and does not create missing ones.
     CHECK_THAT(refusedOverride(lamp, "objects.0.emission.radiance=null"), Contains("found nothing"));
     CHECK_THAT(refusedOverride("environment: {radiance: 1}\n", "environment.radiance=null"),
                Contains("environment needs radiance or image or sky"));

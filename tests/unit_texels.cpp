@@ -230,7 +230,7 @@ TEST_CASE("images that cannot be values say why", "[texels]") {
     CHECK(readTexels(path).info.channels == 3);
 }
 
-// What the pixels need counts, not how well they are compressed.
+// The limit counts the memory of the pixels, not the size of the file.
 TEST_CASE("an image of one colour is read, however small its file is", "[texels]") {
     const TemporaryFolder folder;
     const std::string path = folder.path() + "/a.png";

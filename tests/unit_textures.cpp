@@ -117,7 +117,7 @@ public:
         return crt_surface(&context_, h);
     }
 
-    /// Where a triangle of the scene lies.
+    /// The corners of a triangle of the scene.
     std::uint32_t slotOf(std::uint32_t id) const {
         std::uint32_t slot = 0;
         while (CRT_ARRAY(CrtTriangle, context_.blob, context_.scene->triangles)[slot].id != id) ++slot;

@@ -1,11 +1,12 @@
-// Code comes from files that nobody else could have written: kernels of the cache, plugins, programs, and
-// what links lead to.
+// crt runs no code that other users could have written: kernels of the cache, plugins, programs, and the
+// targets of links.
 #include "backend/loader.h"
 #include "backend/sdk/kernel_cache.h"
 #include "base/code_trust.h"
 #include "base/error.h"
 #include "base/temporary_folder.h"
 #include "catch.h"
+#include "refusal.h"
 
 #include <sys/stat.h>
 #include <unistd.h>
@@ -15,20 +16,10 @@
 
 using namespace crt;
 using crt::TemporaryFolder;
+using crt::test::refusal;
 namespace fs = std::filesystem;
 
 namespace {
-
-/// The sentence of the crt::Error that `work` throws; empty when it throws none.
-template <class Work>
-std::string refusal(const Work& work) {
-    try {
-        work();
-    } catch (const Error& error) {
-        return error.what();
-    }
-    return {};
-}
 
 std::string kernelEntry(const plugin::KernelCache& cache, const std::string& name) {
     return cache.path(plugin::KernelCache::makeKey({name}));

@@ -120,7 +120,7 @@ def measure(program, arguments):
             scenes.append((folder.name, scene))
             print(f"{folder.name} {scene.name}: {scene.verdict} {scene.ratio or ''} {scene.error or ''}",
                   flush=True)
-        # What lies with a scene is a part of it.
+        # Models next to a scene are parts of that scene.
         of_scenes = {path.parent for path in foreign_scenes.scenes(folder)}
         paths = sorted(p for p in folder.rglob("*") if p.suffix.lower() in EXTENSIONS and p.is_file()
                        and not of_scenes & set(p.parents))

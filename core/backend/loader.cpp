@@ -194,7 +194,7 @@ bool isCut(const std::string& file) {
     return false;
 }
 
-/// What is to be opened in place of `path`: what could have been written by others is not run.
+/// The file to open for `path`. Throws where other users could have written it.
 std::string trustedFile(const std::string& name, const std::string& path) {
     const trust::Judged judged = trust::judge(path);
     if (!judged.why.empty()) refuse(fmt::format("backend '{}' ({}) is refused: {}", name, path, judged.why));

@@ -159,7 +159,7 @@ std::string below(const std::string& folder, const std::string& entry) {
     return folder == "/" ? folder + entry : folder + '/' + entry;
 }
 
-/// Where a name leads, and whether somebody else could have chosen that.
+/// The file that a name leads to, and why other users could have chosen it, if they could.
 Judged follow(const std::string& name) {
     constexpr int kMostLinks = 40;  // As Linux has it.
     std::string rest = name;

@@ -19,17 +19,17 @@ namespace crt::trust {
 /// everyone: there nobody can rename or remove what is another's. [any thread]
 std::string whyNot(const struct stat& status, const std::string& name);
 
-/// A name that was followed once. What is opened is `path`, never the name again.
+/// A name that was resolved once. Callers open `path`, never the name again.
 struct Judged {
     std::string path;  ///< Without links; of use where `why` is empty.
     std::string why;   ///< Why it may not be run, as a sentence; empty if it may.
 };
 
-/// The same for code that is opened by its name later, as dlopen() does. The name is followed as the system
-/// follows it. Each folder in which a part of it is looked up is asked, those that links lie in too; a link
-/// belongs to somebody whom whyNot() trusts; and what is found is a regular file. So nobody else can make
-/// the path mean another file later. Folders on the way to the program itself, and above the user's home,
-/// are not asked. A file that cannot be looked at gives its reason. [any thread]
+/// The same for code that is opened by its name later, as dlopen() does. Resolves the name as the system
+/// does, and checks each folder on the way, those of links too. Each link must have an owner that whyNot()
+/// trusts, and the target must be a regular file. So no other user can make the path lead to another file
+/// later. Folders on the way to the program itself, and above the user's home, are not checked. A file whose
+/// status cannot be read gives its reason. [any thread]
 Judged judge(const std::string& name);
 
 /// The same for a folder of programs: it, and all files and folders below it. [any thread]

@@ -145,7 +145,7 @@ public:
         return chosen_;
     }
 
-    /// What was given to the command without an option's name before it.
+    /// The command's arguments that are neither options nor values of options.
     std::vector<std::string> words(const Command& command) const {
         std::vector<std::string> words;
         for (const CLI::Option* option : app_.get_subcommand(command.name)->get_options())

@@ -18,7 +18,7 @@ using CoatKey = std::pair<double, double>;
 
 double alphaOf(const CoatKey& key) { return key.second * key.second; }
 
-/// Whether the kernel asks Fresnel in place of a table.
+/// True where the kernel evaluates Fresnel's equations instead of a table.
 bool isSmooth(const CoatKey& key) {
     return alphaOf(key) < static_cast<double>(CRT_ALPHA_MIN) || key.first == 1;
 }

@@ -122,7 +122,7 @@ Across acrossOf(const Material& material, const LossKey& key) {
     return key.refracts ? acrossIndices(key) : Across{};
 }
 
-/// What a table of glass behind a film depends on, besides its key.
+/// The inputs of a table of glass behind a film, besides its key.
 using FilmKey = std::tuple<LossKey, double, SpectrumValues, SpectrumValues>;
 
 FilmKey filmKeyOf(const Material& material) {

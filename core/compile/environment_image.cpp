@@ -73,7 +73,7 @@ void checkSize(const EnvironmentImage& image, const TexelsInfo& info) {
     if (!why.empty()) refuse(image.place, fmt::format("'{}': {}", image.file, why));
 }
 
-/// What a reader of the file makes of it; what it refuses is told at the image's place in the scene.
+/// The result of `read`. Its errors get the place of the image in the scene.
 template <class Read>
 auto readAt(const SourcePlace& place, const Read& read) {
     try {

@@ -117,7 +117,7 @@ double microfacetLoss(const Vec3d& w, double eta, const Widths& alpha, const F& 
                               : meanOverVisibleNormals<32, kFineness>(w, alpha, lost);
 }
 
-/// What one row is made by.
+/// The function that computes one row.
 struct Row {
     double index, alpha;
     std::shared_ptr<const FilmReflectance> film;  ///< Null: the interface has none.

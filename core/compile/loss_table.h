@@ -9,7 +9,7 @@
 
 namespace crt {
 
-/// What a table depends on.
+/// The inputs of a table.
 struct LossKey {
     bool refracts;
     double least, most;  ///< Index, inside over outside.
@@ -19,13 +19,13 @@ struct LossKey {
     auto operator<=>(const LossKey&) const = default;
 };
 
-/// What a row of a table is of: one index, or a film at one wavelength.
+/// The surface of one row: one index of refraction, or a film at one wavelength.
 struct Interface {
     double index = 0;                        ///< Inside over outside; 0: a metal.
     double film_index = 0, film_rounds = 0;  ///< Relative to the outside; 2 d / λ. 0: there is none.
 };
 
-/// What rows of a table are made for, side by side.
+/// The surfaces of the rows of a table, in order.
 struct Across {
     std::vector<Interface> interfaces{{}};
     double first = 0, step = 1;  ///< Of what the kernel looks rows up by.

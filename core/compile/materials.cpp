@@ -170,12 +170,16 @@ std::vector<const Material*> usedMaterials(const Scene& scene, const FlatScene& 
     return materials;
 }
 
-MaterialTables materialTablesOf(const std::vector<const Material*>& materials) {
+TableWork tableWorkOf(const std::vector<const Material*>& materials) {
     TableWork work;
     countCoats(materials, work);
     countRoughBases(materials, work);
     countCompensations(materials, work);
-    work.requireBounded();
+    return work;
+}
+
+MaterialTables materialTablesOf(const std::vector<const Material*>& materials) {
+    tableWorkOf(materials).requireBounded();
     Coats coats = coatsOf(materials);
     RoughBases rough_bases = roughBasesOf(materials, coats);
     return {std::move(coats), compensationsOf(materials), std::move(rough_bases)};

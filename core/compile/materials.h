@@ -6,6 +6,7 @@
 #include "compile/flatten.h"
 #include "compile/rough_base.h"
 #include "compile/spectrum_table.h"
+#include "compile/table_work.h"
 #include "compile/textures.h"
 #include "kernel/layout.h"
 #include "scene/scene.h"
@@ -27,7 +28,12 @@ struct MaterialTables {
     Compensations compensations;
     RoughBases rough_bases;
 };
+
+/// Throws crt::Error(Scene) where tableWorkOf() is beyond its bound.
 MaterialTables materialTablesOf(const std::vector<const Material*>& materials);
+
+/// The work of these tables, counted without making them.
+TableWork tableWorkOf(const std::vector<const Material*>& materials);
 
 /// The spectra that compileMaterials asks the table for.
 std::vector<const Spectrum*> spectraOfMaterials(const std::vector<const Material*>& materials,

@@ -68,7 +68,7 @@ RoughBase makeRoughBase(const Material& material, const Coat& coat) {
 
 namespace {
 
-/// What a base depends on: index and roughness of the coat, its own roughness.
+/// The inputs of a base: index and roughness of the coat, its own roughness.
 std::array<double, 3> keyOf(const Material& plastic) {
     return {plastic.eta[0], plastic.roughness, plastic.diffuse_roughness};
 }

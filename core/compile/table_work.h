@@ -1,5 +1,5 @@
-/// What the tables of materials cost, counted before any of them is made, and the most that a scene may ask
-/// for: a few characters of a file each stand for half a second of a processor.
+/// The cost of the tables of materials, counted before any of them is made, and the most that a scene may
+/// have: a few characters of a file each stand for half a second of a processor.
 #pragma once
 
 #include "scene/scene.h"

@@ -144,7 +144,7 @@ SceneTrait geometryTrait(const Scene& scene) {
     Digest digest;
     std::uint64_t triangles = 0, shapes = 0, placements = 0;
     for (const Mesh& mesh : scene.meshes) {
-        // What the coordinates are for, textures say.
+        // Only textures use the coordinates.
         const auto& [positions, normals, corners, normal_index, uvs, uv_index, uvs_are_opacity, colors,
                      material, emission] = mesh;
         digest.add(positions);

@@ -52,7 +52,7 @@ struct FilmRecord {
     /// Adds the names of another run of the same film, each once, and takes the later of both dates.
     void addRun(const FilmRecord& other);
 
-    /// Whether its colours are radiance, and not a view for debugging.
+    /// True if its colours are radiance, false for a debugging view.
     bool holdsRadiance() const;
 
     bool isCropped() const { return window != std::array<int, 4>{0, 0, width, height}; }

@@ -102,7 +102,7 @@ struct Part {
     std::uint64_t width = 0, height = 0, channels = 0;
 };
 
-/// What a byte of Deflate becomes at most: two bits repeat 258 bytes.
+/// The most bytes that one byte of Deflate expands to: two bits repeat 258 bytes.
 constexpr double kDeflateBytesAByte = 1032;
 
 /// Throws DamagedHeader when pixels of `bytes` do not come out of a file that holds `most_bytes` at most.

@@ -8,7 +8,7 @@
 
 namespace crt::image {
 
-/// What the header says.
+/// The contents of the header.
 struct RadianceHeader {
     std::uint32_t width = 0, height = 0;
     bool is_xyz = false;  ///< Pixels are CIE XYZ, not red, green and blue.

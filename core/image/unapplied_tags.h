@@ -1,4 +1,4 @@
-/// What an image file says of its pixels that crt does not apply to them.
+/// Tags of an image file that would change its pixels and that crt does not apply.
 #pragma once
 
 #include <cstdint>

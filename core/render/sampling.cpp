@@ -149,7 +149,7 @@ public:
         current_ = false;
         unread_.push_back(samples);
     }
-    /// What the device has rendered since it was last read.
+    /// The samples that the device has rendered since the last read.
     std::vector<SampleRange> takeUnread() { return std::exchange(unread_, {}); }
     /// The device's film is empty again.
     void deviceRestarted() {
@@ -264,7 +264,7 @@ SamplingResult sampleFilm(DeviceFilm& devices, Film& film, const SamplingPlan& p
         patience.chunkBegins();
         show(0);
         devices.render({.first_sample = first, .sample_count = count}, show);
-        patience.chunkBegins();  // What is done is not given up.
+        patience.chunkBegins();  // Finished samples are kept.
         show(1);  // Of a plugin's threads the last to finish need not be the last to have said so.
         reader.deviceAdvanced({first, first + count});
         // In bands nothing of it is on the devices any more, and a failure later shall not cost it.

@@ -16,9 +16,9 @@
 
 namespace crt {
 
-/// What the colours of a picture stand for: a bar of colours with numbers at its ends.
+/// The scale of a false-colour picture: a bar of colours with numbers at its ends.
 struct ColourScale {
-    std::string name{};        ///< What it is of; empty: the legend says it.
+    std::string name{};        ///< The quantity; empty if the legend has it.
     double low = 0, high = 1;  ///< Values beyond them have the colours of the ends.
     std::string unit{};        ///< Empty: a pure number.
     bool logarithmic = false;

@@ -29,7 +29,7 @@ struct ViewChange {
     std::optional<std::string> white, plane, backend, device;
 };
 
-/// What a request holds: changes in order. One that cannot be read leaves the others as they are.
+/// The changes of a request, in order. One that cannot be read leaves the others as they are.
 struct RequestedChange {
     ViewChange change;
     std::string refusal;  ///< Why it cannot be read; empty: it can.

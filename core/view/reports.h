@@ -1,4 +1,4 @@
-/// What a page asks for once: a pixel, the image as files, the devices.
+/// One-time requests of a page: a pixel, the image as files, the devices.
 #pragma once
 
 #include "view/planes.h"

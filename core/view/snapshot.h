@@ -15,7 +15,7 @@ namespace crt {
 /// A scene as it is seen: its camera is where hands have moved it.
 struct SeenScene {
     std::shared_ptr<const Scene> read;  ///< As the file says.
-    CameraPose pose;                    ///< Where hands have moved the camera.
+    CameraPose pose;                    ///< The camera as the user has moved it.
     Camera camera;                      ///< The file's with that pose.
     std::shared_ptr<const PrimitiveNames> names;
     std::uint32_t width = 0, height = 0;  ///< Of the whole film's crop window.

@@ -111,7 +111,7 @@ void CudaIntegrator::setScene(const CrtSceneBlob& blob) {
             compile_seconds_ += program_->compileSeconds();
             cache_seconds_ += program_->cacheSeconds();
         }
-        // What is rendered with while waves are compiled takes a path to its end.
+        // While waves are compiled, the kernel that takes a path to its end renders.
         const bool waits = kernel_choice_ == CRT_KERNEL_LEAN && mayOutlastLaunch(scene.max_depth);
         program_ = std::make_unique<CudaProgram>(host_, device_, wanted,
                                                  waits ? CRT_KERNEL_LEAN_ONLY : kernel_choice_);

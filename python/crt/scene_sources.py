@@ -1,4 +1,4 @@
-"""Where scenes come from: files, text, and dicts with NumPy arrays in them."""
+"""Sources of scenes: files, text, and dicts with NumPy arrays in them."""
 
 import contextlib
 import json
@@ -77,7 +77,7 @@ class Text:
 
 
 def say_nothing(_level, _text):
-    """What there is to say of a scene is said when it is read for a render."""
+    """Messages about a scene appear when it is read for a render."""
 
 
 class Folder:

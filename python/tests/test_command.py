@@ -59,7 +59,7 @@ def test_a_scene_of_another_renderer_renders_at_once(foreign, backend):
     done = run("ball.pbrt", "-b", backend, "--spp", "2", "--set", "film.resolution=[4, 6]")
     assert done.returncode == 0, done.stderr
     assert "material 'hair': diffuse" in done.stderr
-    # Where the user is, under the scene's own name.
+    # In the user's folder, under the scene's own name.
     assert {path.name for path in foreign.iterdir()} == {
         "ball.pbrt", "temporary", "ball.exr", "ball.png", "ball.report.json"}
     wait_until_empty(foreign / "temporary")

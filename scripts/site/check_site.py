@@ -7,7 +7,7 @@ import sys
 import urllib.parse
 
 LOADS = {("script", "src"), ("img", "src"), ("source", "src"), ("iframe", "src"), ("video", "src")}
-# What search needs in pages that are opened as files.
+# Search in pages that are opened as files needs these.
 SEARCH = ("assets/iframe-worker.js", "search/search_index.js")
 LOADED_LINKS = ("stylesheet", "icon", "preload")
 

@@ -62,7 +62,7 @@ def give_up(*_):
 
 
 def fault(path, crt):
-    """What is wrong with the import of a file, or None."""
+    """The fault of an import, or None."""
     signal.setitimer(signal.ITIMER_PROF, SECONDS)
     try:
         crt.import_scene(path)

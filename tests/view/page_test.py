@@ -61,7 +61,7 @@ class PageTest(LightTest):
         self.assertEqual(getattr(self, "errors", []), [])
 
     def wait(self, page, condition):
-        """Asked from here: the page's own rules let nobody evaluate text in it."""
+        """The test evaluates this, because the page's content policy forbids eval."""
         end = time.monotonic() + PATIENCE_SECONDS
         while not page.evaluate(f"Boolean({condition})"):
             self.assertLess(time.monotonic(), end, condition)
@@ -93,7 +93,7 @@ class PageTest(LightTest):
         return page.evaluate("view.picture.number")
 
     def pixels(self, page):
-        """What the canvas holds, [height][width][3]."""
+        """The pixels of the canvas, [height][width][3]."""
         return without_alpha(bytes(page.evaluate(
             "Array.from(paper.getImageData(0, 0, canvas.width, canvas.height).data)")))
 

@@ -13,7 +13,7 @@ from harness import LIT
 
 
 class Bursts(PageTest):
-    """What hands do faster than the program replies."""
+    """Input that is faster than the program's replies."""
 
     def press(self, page, *keys):
         """All of them before the page can hear of any."""

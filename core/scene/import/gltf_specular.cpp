@@ -43,7 +43,7 @@ tinygltf::TextureInfo textureInfo(const Value& extension, const char* key) {
     return info;
 }
 
-/// What the extension says, with the means of its textures.
+/// The values of the extension, with the means of its textures.
 struct Said {
     const Value& own;
     Color diffuse{1, 1, 1}, specular{1, 1, 1};  ///< Factors.
@@ -142,7 +142,7 @@ std::optional<tinygltf::Material> withoutSpecularGlossiness(const tinygltf::Mate
     const Said said = saidIn(own, textures, pointer + "/extensions/" + kGltfSpecularGlossiness);
     const Color& specular = said.mean_specular;
     const double left = 1 - gltfLargest(specular);
-    // What a metal would leave out and one sees.
+    // Visible losses of a metal.
     constexpr double kNoticeable = 0.02;
     const bool shows_diffuse = said.most_diffuse * left > kNoticeable;
     const std::optional<double> cutoff = cutoffOf(said, textures);

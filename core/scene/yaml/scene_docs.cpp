@@ -239,7 +239,7 @@ objects:
   - {name: sphere, obj: sphere.obj, material: white, transform: [{scale: 280}, {translate: [278, 0, 290]}]}
 ```
 
-## What the numbers of an image are
+## Units of the numbers in an image
 
 EXR and PFM files hold radiance in the colour space of the film: XYZ are ∫ L (x̄, ȳ, z̄) dλ / ∫
 ȳ dλ, with L in W·m⁻²·sr⁻¹·nm⁻¹, and RGB are linear in them. So a pixel with Y = 1, such as

@@ -11,7 +11,7 @@ void addMissing(const KeyRule& rule, const IsGiven& given, std::set<std::string>
         if (!given(key)) gone.insert(key);
 }
 
-/// What goes together with keys that are gone.
+/// Keys that belong to keys that were removed.
 void addCompanions(const SectionSchema& section, const IsGiven& given, std::set<std::string>& gone) {
     const auto is_gone = [&gone](const std::string& key) { return gone.contains(key); };
     for (const KeyRule& rule : section.rules)

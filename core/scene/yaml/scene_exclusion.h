@@ -1,4 +1,4 @@
-/// What gives way where keys are put over those of a map that is there: an included section under the
+/// The keys that give way where others override a map: an included section under the
 /// scene's own, a scene under `--set`. One rule for both, made of the rules in the table of keys.
 #pragma once
 
@@ -12,7 +12,7 @@
 
 namespace crt {
 
-/// Whether a key is among those that are put over the others.
+/// True if a key is among the overriding keys.
 using IsGiven = std::function<bool(const std::string&)>;
 
 /// Keys that the map below loses: those that exclude a given one, and what goes together with them. An

@@ -155,7 +155,7 @@ std::optional<std::uint32_t> colorInComment(const YamlPlace& place) {
     return hexColor(std::string_view(line).substr(mark, end - mark));
 }
 
-/// Whether the value may stand under the key as it is.
+/// True if the value is valid for the key.
 bool takes(const KeySchema& key, const YamlNode& node) {
     if (node.kind == YamlKind::List)
         return key.kind == ValueKind::Number && key.shape == ValueShape::List &&

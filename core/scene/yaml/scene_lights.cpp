@@ -161,7 +161,7 @@ void readBrightness(const SectionReader& section, SpectrumReader& spectra, Point
     }
 }
 
-/// Whether the light is given by an amount that spreads over square metres before it lights a surface.
+/// True if the light is specified by an amount that spreads over square metres, such as lumens.
 bool spreadsOverArea(const SectionReader& section, const PointLight& light) {
     switch (light.type) {
         case PointLightType::Point:

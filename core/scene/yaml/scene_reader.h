@@ -129,7 +129,7 @@ public:
     /// The same of a file that can only be beside the one that names it.
     std::optional<std::string> locateBeside(const std::string& name, const YamlPlace& place,
                                             Diagnostics& out);
-    /// What was found for the name at `place`; null where no file was looked for.
+    /// The file that was found for the name at `place`; null if none was searched for.
     const std::string* pathAt(const YamlPlace& place) const;
     /// Notes that a file went into the scene; every file once.
     void note(const std::string& path);

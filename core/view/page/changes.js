@@ -48,7 +48,7 @@ async function sendChanges() {
     try {
       await sendSome();
     } catch {
-      // Nobody knows whether they arrived: they are sent again.
+      // They may not have arrived: send them again.
       await sleep(view.connected ? 250 : 2000);
     }
   }
@@ -74,7 +74,7 @@ async function allArrived() {
   while (sending) await sleep(10);
 }
 
-/// Whether the status knows of every wish: until then controls show what hands have set.
+/// True once the status includes every change; until then controls show the user's values.
 function knowsAllChanges(status) {
   return !changes.queue.length && status.version >= changes.version;
 }

@@ -54,7 +54,7 @@ function scaleBar(scale) {
 
 let scalesDrawn = "";
 
-/// What the colours of the picture stand for.
+/// The quantity that the picture's colours show.
 function drawScales({ legend, scales }) {
   const now = JSON.stringify([legend, scales]);
   if (now === scalesDrawn) return;

@@ -37,7 +37,7 @@ function placeMark() {
   mark.style.top = box.top - frame.top + top * box.height + "px";
 }
 
-/// Whether numbers of that run are numbers of what is shown.
+/// True if numbers of that run belong to the picture on the page.
 function isShown(run) {
   return view.picture !== null && view.picture.of_this_camera && view.picture.run === run;
 }
