@@ -1,4 +1,4 @@
-/// glTF files for tests, imported: the text of the scene, the scene, and what was said.
+/// Imported glTF files for tests: the text of the scene, the scene, and the messages.
 #pragma once
 
 #include "gltf_file_maker.h"
@@ -24,7 +24,7 @@ inline std::string rgba(unsigned width, unsigned height, const std::vector<std::
     return pngOf(kind, zlibStream(filteredRows(kind, bytesOf(codes))));
 }
 
-/// The text of the import, and the scene that it is; the log is what was said.
+/// The text of the import, its scene, and the messages.
 struct Imported {
     std::string text, log;
     Scene scene;

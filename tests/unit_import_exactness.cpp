@@ -35,7 +35,7 @@ TEST_CASE("The alpha of vertices is opacity where the material has some", "[gltf
     CHECK(soft.scene.meshes[0].uvs_are_opacity);
     CHECK(soft.scene.meshes[0].uvs[3] == std::array<double, 2>{0.5, 0});
     CHECK_THAT(with(mask, ramp).text, Contains("geometry_opacity: {attribute: opacity, cutoff: 0.75}\n"));
-    // With a texture beside it only what is even can be told.
+    // Next to a texture, only an even alpha can be kept.
     both["pbrMetallicRoughness"]["baseColorTexture"] = {{"index", 0}};
     CHECK_THAT(with(both, even, true).text, Contains("channel: alpha, factor: 0.25}"));
     const Imported lost = with(both, ramp, true);

@@ -32,7 +32,7 @@ TEST_CASE("triangles without area are left out with a warning", "[scene_yaml]") 
     CHECK(warningCount() == before + 1);
 }
 
-// Wherever the mesh comes from, and whatever else is asked of it.
+// For every source of the mesh and every option.
 TEST_CASE("an object whose mesh has no face of an area is left out with a warning", "[scene_yaml]") {
     const TemporaryFolder folder;
     folder.write("flat.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n");

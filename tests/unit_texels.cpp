@@ -279,7 +279,7 @@ TEST_CASE("what a file says of its pixels and crt does not apply is told", "[tex
         spit(jpeg, marked);
         CHECK_THAT(toldOf(jpeg, false),
                    Contains("a.jpg") && Contains("EXIF orientation 6") && Contains("turn the pixels"));
-        // Cut anywhere, it says nothing and does no harm.
+        // Truncated anywhere, it is ignored.
         for (std::size_t size = 0; size < exif.size() - 4; ++size) {
             spit(png, pngOf(kind, stream, pngChunk("eXIf", exif.substr(0, size))));
             CHECK(toldOf(png, false).empty());

@@ -6,10 +6,10 @@
 
 namespace crt {
 
-/// The one that CRT_PYTHON names, else python3; empty where CRT_PYTHON is, which asks for none.
+/// The Python of CRT_PYTHON, else python3. Empty if CRT_PYTHON is empty, which means: use no Python.
 std::string pythonProgram();
 
-/// How a program ended, and what it said on stderr.
+/// The exit of a program and its standard error.
 struct EndedProgram {
     int error = 0;   ///< Of starting it, as in errno.
     int status = 0;  ///< Of waitpid.

@@ -500,11 +500,11 @@ std::vector<int> channelsOf(const ImageSpec& spec, Part part) {
 
 /// The caller's buffer.
 struct Target {
-    unsigned char* data;  ///< Null: the header alone is asked for.
+    unsigned char* data;  ///< Null to read only the header.
     std::uint64_t bytes;
 };
 
-/// Throws Failure with what a reader says, unless that is nothing.
+/// Throws Failure with a reader's message, unless it is empty.
 void require(const std::string& why) {
     if (!why.empty()) throw Failure{why};
 }

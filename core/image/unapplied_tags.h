@@ -7,7 +7,7 @@
 
 namespace crt {
 
-/// 0: the file says nothing.
+/// 0: the file does not have the tag.
 struct UnappliedTags {
     double gamma = 0;               ///< PNG (gAMA): the exponent of its encoding.
     double exposure = 0;            ///< Radiance HDR (EXPOSURE): what its pixels were multiplied by.

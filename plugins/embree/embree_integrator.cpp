@@ -131,7 +131,7 @@ bool EmbreeIntegrator::render(const CrtRenderRange& range) {
     std::mutex progress_mutex;
     const double all = static_cast<double>(columns) * rows *
                        static_cast<double>(std::max<std::uint64_t>(range.sample_count, 1));
-    // One thread at a time tells the host; the others have better things to do than wait.
+    // One thread at a time calls the host, so that the others need not wait.
     const auto tell = [&] {
         const std::unique_lock lock(progress_mutex, std::try_to_lock);
         if (lock.owns_lock() && host_.cancelled(static_cast<double>(done.load()) / all)) cancelled = true;

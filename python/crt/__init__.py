@@ -35,7 +35,7 @@ __all__ = ["Denoised", "Device", "Error", "ErrorEstimate", "Film", "Image", "Imp
 
 
 def __getattr__(name):
-    """crt.distributed, which imports Dask: only when it is asked for."""
+    """crt.distributed, imported on first use because it imports Dask."""
     if name == "distributed":
         return importlib.import_module(".distributed", __name__)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,4 +1,4 @@
-"""Scenes of other programs: what an import says of features that crt does not have."""
+"""Scenes of other programs: the losses that an import reports."""
 
 import math
 import os

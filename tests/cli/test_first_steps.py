@@ -136,7 +136,7 @@ class Units(LightTest):
         self.assertAlmostEqual(dark / BULB_Y, 1e-6, delta=1e-8)
         self.assertIn("a scene unit counts as a metre", said)
         self.assertIn("write 'unit: mm'", said)
-        # Not where the scene says that it is as large as that.
+        # Not if the scene states that size.
         self.assertNotIn("unit: mm", self.render(BULB.format(1000, 2000), "--set", "unit=m")[1])
         self.assertNotIn("unit: mm", self.render(BULB.format(1000, 2000), "--set", "film.exposure_ev=25")[1])
 
@@ -175,7 +175,7 @@ class OtherRenderers(CliTest):
         self.assertEqual(run.stdout.splitlines()[1:], ["render", "other.xml", "--spp", "2", "-q"])
         run = self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", "--report", "other.xml", CRT_PYTHON=python)
         self.assertEqual(run.stdout, "")
-        # A command line that is wrong is told before.
+        # The program checks the command line first.
         self.assertEqual(self.crt("other.xml", "--ssp", "3", expect=2, CRT_PYTHON=python).stdout, "")
 
     def test_without_the_package_there_is_a_hint(self):

@@ -89,7 +89,7 @@ class Bursts(PageTest):
             page.keyboard.press("]")
         self.arrived(page)
         self.assertEqual(page.locator("#exposure").input_value(), "1")
-        # The slider keeps what hands have set, whatever the program says before it hears of that.
+        # The slider keeps the user's value until the program has received it.
         release = self.hold(page, "**/change?*")
         for key in ("ArrowRight", "ArrowRight", "ArrowRight"):
             page.keyboard.press(key)

@@ -31,7 +31,7 @@ struct GltfMaterialText {
     std::size_t uv_set = 0;
     std::array<double, 3> color_factor{1, 1, 1};
     std::string emission;         ///< Of the object; empty: none.
-    bool vertex_opacity = false;  ///< It asks for opacities in place of texture coordinates.
+    bool vertex_opacity = false;  ///< It uses opacities instead of texture coordinates.
     bool normal_map = false;
     double mirrors = 0;  ///< Share of the surface that sends light on in single directions alone.
 };

@@ -30,7 +30,7 @@ void ObjectReader::tellGltf() const {
                    lost.primitives);
 }
 
-/// Nothing where it is wrong, which is told.
+/// Nothing if it is invalid; reports the error.
 std::optional<std::uint32_t> ObjectReader::readGltf(const SectionReader& object) {
     const std::optional<SectionReader> form =
         object.section("gltf", fmt::format("the gltf of {}", object.subject()));

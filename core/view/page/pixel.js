@@ -3,7 +3,7 @@ const probe = {
   at: null,        // The pixel of the film; null: none.
   size: "",        // Of the film that it is a pixel of.
   run: null,       // Whose numbers are shown; null: none are.
-  number: 0,       // Of the picture that they were asked for with.
+  number: 0,       // Of the picture at the time of the request.
   reading: false,
 };
 const sizeOf = (status) => status.width + " x " + status.height;
@@ -65,7 +65,7 @@ async function readPixel() {
     const text = await reply.text();
     if (probe.at === at) takePixel(reply.ok, text, number);
   } catch {
-    // The connection is lost: the next status asks again.
+    // The connection is lost: the next status requests them again.
   }
   probe.reading = false;
   if (probe.at !== at || view.picture.number !== number) followPixel();

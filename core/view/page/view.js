@@ -57,7 +57,7 @@ function draw(status, pixels) {
   if (resized) layOut();
 }
 
-/// Another program answers: what was asked of the one before is not meant for it.
+/// Another program answers: drop the requests to the one before.
 function forgetProgram() {
   changes = noChanges();
   probe.run = null;
