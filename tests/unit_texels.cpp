@@ -127,6 +127,26 @@ TEST_CASE("texels of an EXR lie where its data window lies in the picture", "[te
     }
 }
 
+TEST_CASE("a display window that no pixels pay for is refused", "[texels]") {
+    const TemporaryFolder folder;
+    const std::string name = folder / "part.exr";
+    Image image = imageOf(std::vector<float>(18, 0.5f));
+    // 16 million pixels are allowed with any data window, more with 64 times its pixels.
+    for (const auto& [width, height] : {std::pair{1u << 24, 1u}, std::pair{4096u, 4096u}}) {
+        image.whole_width = width;
+        image.whole_height = height;
+        writeImage(name, OutputFormat::Exr, image);
+        CHECK(texelsInfo(name).count() == std::uint64_t{1} << 24);
+    }
+    for (const auto& [width, height] : {std::pair{184549379u, 1u}, std::pair{4097u, 4096u}}) {
+        image.whole_width = width;
+        image.whole_height = height;
+        writeImage(name, OutputFormat::Exr, image);
+        CHECK_THROWS_WITH(texelsInfo(name), ContainsSubstring("its display window has") &&
+                                                ContainsSubstring("its data window only 3 x 2"));
+    }
+}
+
 TEST_CASE("texels of a JPEG: colour, grey, progressive, without metadata", "[texels]") {
     const TemporaryFolder folder;
     const std::string path = folder.path() + "/a.jpg";

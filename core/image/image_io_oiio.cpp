@@ -12,6 +12,7 @@
 
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
@@ -488,6 +489,18 @@ struct Placement {
         }
     }
 
+    /// A display window costs memory that no pixel of the file pays for: a header of 1 kB may name gigabytes.
+    void requireReasonable(const ImageSpec& spec) const {
+        constexpr std::int64_t kAlwaysPixels = std::int64_t{1} << 24, kMostTimes = 64;
+        const std::int64_t read = std::int64_t{spec.width} * spec.height;
+        if (width * height > std::max(kAlwaysPixels, kMostTimes * read))
+            throw Failure{fmt::format("its display window has {} x {} pixels, its data window only {} x {}; "
+                                      "above {} million pixels the display window may have {} times the "
+                                      "pixels of the data window",
+                                      width, height, spec.width, spec.height, kAlwaysPixels >> 20,
+                                      kMostTimes)};
+    }
+
     std::int64_t width, height;  ///< Of the picture (its display window).
     std::int64_t left, top;      ///< Of the file's first pixel in it.
     bool is_whole;
@@ -542,6 +555,7 @@ void readPartOf(ImageInput& input, const ImageSpec& spec, Part part, const char*
                height = static_cast<std::uint64_t>(std::max(spec.height, 0));
     crt::image::checkRows(width, height, spec.pixel_bytes(true));
     const Placement placement(spec);
+    placement.requireReasonable(spec);
     const std::vector<int> channels = channelsOf(spec, part);
     info.width = static_cast<std::uint32_t>(placement.width);
     info.height = static_cast<std::uint32_t>(placement.height);

@@ -57,9 +57,11 @@ std::vector<const Material*> ObjectReader::glassOf(const Material& material) con
         return {&material};
     std::vector<const Material*> all;
     if (material.isComposed())
-        for (const std::int32_t part : material.parts)
+        for (const std::int32_t part : material.parts) {
+            if (part < 0) continue;  // Its name is missing or wrong; that error is reported where it stands.
             for (const Material* glass : glassOf(scene_.materials[static_cast<std::size_t>(part)]))
                 all.push_back(glass);
+        }
     return all;
 }
 
@@ -87,7 +89,7 @@ bool ObjectReader::transmits(const Material& part) const {
     const auto index = static_cast<std::int32_t>(&part - scene_.materials.data());
     if (part.type != MaterialType::Mix || parts_.contains(index)) return part.transmits();
     return std::any_of(part.parts.begin(), part.parts.end(), [&](std::int32_t i) {
-        return transmits(scene_.materials[static_cast<std::size_t>(i)]);
+        return i >= 0 && transmits(scene_.materials[static_cast<std::size_t>(i)]);
     });
 }
 
