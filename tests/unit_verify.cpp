@@ -1,14 +1,14 @@
 // The suite of `crt verify` itself: its registry, its verdicts, its diagnoses, and that its expectations are
 // right.
 #include "catch.h"
-#include "judge/verify/case.h"
-#include "judge/verify/context.h"
-#include "judge/verify/physics.h"
-#include "judge/verify/references.h"
-#include "judge/verify/report.h"
-#include "judge/verify/variants.h"
 #include "kernel/features.h"
 #include "kernel/layout.h"
+#include "verify/case.h"
+#include "verify/context.h"
+#include "verify/physics.h"
+#include "verify/references.h"
+#include "verify/report.h"
+#include "verify/variants.h"
 
 #include <fmt/format.h>
 

@@ -9,7 +9,7 @@ import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 FOLDERS = (".github", "bench", "cmake", "configs", "core", "data", "docs", "plugins", "python", "scripts",
-           "tests")
+           "tests", "verify")
 KINDS = {".c", ".cl", ".cmake", ".cpp", ".csv", ".cu", ".h", ".in", ".json", ".map", ".patch", ".py",
          ".supp", ".txt", ".yaml", ".yml"}
 BYTES = 109
