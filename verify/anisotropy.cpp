@@ -59,10 +59,6 @@ void furnace(Context& context) {
             {{brushedAlbedo(across, 0.2, 3, wide, narrow), "along and across are exchanged"},
              {roughConductorAlbedo(along[2], 0.2, 3, wide), "the surface is isotropic"}});
     }
-    context.refused("anisotropy 1.5",
-                    "crt: 1\nmaterials: {it: {type: rough_conductor, metal: Ag, roughness: 0.5, "
-                    "roughness_anisotropy: 1.5}}\n",
-                    "roughness_anisotropy");
     if (!context.atLeast(Level::Merge)) return;
     // Clear glass cannot be seen.
     Stage stage("{position: [0.2, 3, 4], target: [0.5, 0.5, 0.5], fov: 12}",

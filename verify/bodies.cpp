@@ -222,9 +222,6 @@ void glassWithHoles(Context& context) {
         [](const std::vector<Film>& f) { return radiance(f[0]) / radiance(f[1]); },
         0.6 * (0.6 + 0.4 * (1 - r) / (1 + r)), 0.02, {.samples = 256, .most = 65536},
         {{0.36 * (0.6 + 0.4 * (1 - r) / (1 + r)), "shadow rays ask at both faces"}});
-    context.refused("holes in glass that absorbs",
-                    "crt: 1\nmaterials: {it: {type: dielectric, ior: 1.5, absorption: 1, opacity: .5}}\n",
-                    "opacity");
 }
 
 }  // namespace

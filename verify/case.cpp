@@ -12,7 +12,7 @@
 namespace crt::verify {
 namespace {
 
-constexpr std::array<std::pair<char, const char*>, 15> kGroups{{
+constexpr std::array<std::pair<char, const char*>, 14> kGroups{{
     {'A', "Closed forms"},
     {'B', "Scale and position"},
     {'C', "Degenerate and awkward geometry"},
@@ -23,7 +23,6 @@ constexpr std::array<std::pair<char, const char*>, 15> kGroups{{
     {'H', "Spectrum and colour"},
     {'I', "Accumulation, random numbers, samplers"},
     {'J', "Image and camera"},
-    {'K', "Input hygiene and size"},
     {'L', "Floating point environment and backends"},
     {'M', "Relations between images"},
     {'N', "Faults that no other case would notice"},
@@ -45,7 +44,6 @@ const char* name(Level level) { return kLevels[static_cast<std::size_t>(level)];
 const char* name(Verdict verdict) {
     switch (verdict) {
         case Verdict::Pass: return "pass";
-        case Verdict::Refused: return "refused as documented";
         case Verdict::NotApplicable: return "not applicable";
         case Verdict::Inconclusive: return "INCONCLUSIVE";
         case Verdict::Fail: break;
@@ -61,15 +59,14 @@ std::optional<Level> levelNamed(std::string_view text) {
 
 Verdict worst(const std::vector<Outcome>& outcomes) {
     if (outcomes.empty()) return Verdict::Fail;
-    // What does not apply, or is refused, in part has still been answered in the other part.
+    // If one part does not apply, the other part has still been answered.
     bool passed = false;
-    Verdict verdict = Verdict::Pass, softest = Verdict::NotApplicable;
+    Verdict verdict = Verdict::NotApplicable;
     for (const Outcome& o : outcomes) {
         if (failed(o.verdict)) verdict = std::max(verdict, o.verdict);
         passed = passed || o.verdict == Verdict::Pass;
-        softest = std::min(softest, o.verdict);
     }
-    return failed(verdict) || passed ? verdict : softest;
+    return !failed(verdict) && passed ? Verdict::Pass : verdict;
 }
 
 const std::vector<Case>& registry() {
@@ -82,8 +79,7 @@ const std::vector<Case>& registry() {
               thinFilmCases,   anisotropyCases,    openPbrCases,      openPbrCoatCases,   compositionCases,
               bodyCases,       shadingNormalCases, quadricCases,      instanceCases,      shapeLightCases,
               colourCases,     textureCases,       accumulationCases, cameraCases,        firstHitCases,
-              imageCases,      inputCases,         backendCases,      exactRelationCases, mutantCases,
-              contactCases})
+              imageCases,      backendCases,       exactRelationCases, mutantCases,       contactCases})
             for (Case& c : group()) all.push_back(std::move(c));
         std::sort(all.begin(), all.end(), [](const Case& a, const Case& b) { return a.id < b.id; });
         return all;

@@ -24,7 +24,6 @@ enum class Level { Commit, Merge, Nightly };
 /// failure: "could not reject" proves nothing.
 enum class Verdict {
     Pass,
-    Refused,  ///< The documented refusal: the input was turned down with the message that it should get.
     NotApplicable,  ///< Cannot be asked of this backend or of crt; the outcome's note says why.
     Inconclusive,
     Fail,
@@ -41,7 +40,7 @@ struct Outcome {
     std::optional<stats::Interval> interval;  ///< Of kConfidence, of `measured`, where it was estimated.
     std::string tolerance;            ///< "± 0.1 %", "same bits"
     std::string
-        note;  ///< A figure worth keeping, the reason why it does not apply, or the message of a refusal.
+        note;  ///< A figure worth keeping, the or the reason why it does not apply.
     std::string physics;              ///< Of a failure: what the numbers suggest.
 };
 
@@ -120,7 +119,6 @@ std::vector<Case> accumulationCases();   ///< I
 std::vector<Case> cameraCases();         ///< J: lens and filter
 std::vector<Case> firstHitCases();       ///< D, J: what is told of first hits
 std::vector<Case> imageCases();          ///< J
-std::vector<Case> inputCases();          ///< K
 std::vector<Case> backendCases();        ///< L
 std::vector<Case> exactRelationCases();  ///< M01 to M19
 std::vector<Case> mutantCases();         ///< N

@@ -105,9 +105,6 @@ void texturedOpacity(Context& context) {
                          sheet(below, 1, "veil").yaml(), meanRadiance, (1 - expectedAt(x, 0.05)) / kPi,
                          0.005, effort, {{expectedAt(x, 0.05) / kPi, "opacity is transparency"}});
     }
-    context.refused("an opacity of 1.1",
-                    "crt: 1\nmaterials: {m: {type: mirror, reflectance: 1, opacity: 1.1}}\n",
-                    "'opacity'");
 }
 
 void cutoffs(Context& context) {
@@ -135,11 +132,6 @@ void cutoffs(Context& context) {
                          {.samples = 64, .most = 65536},
                          {{1 - place.before, "texels are not cut off, or after they are filtered"}});
     }
-    context.refused("a cutoff of a colour",
-                    fmt::format("crt: 1\nmaterials: {{m: {{type: diffuse, reflectance: {{texture: '{}', "
-                                "cutoff: 0.5}}}}}}\n",
-                                path),
-                    "'cutoff' is for numbers");
 }
 
 void emittersWithHoles(Context& context) {
@@ -228,12 +220,6 @@ void mixes(Context& context) {
                              floor(integrator, mix.material), meanRadiance, mix.albedo, 0.01, effort,
                              mix.mistakes);
     }
-    context.refused("a mix of itself",
-                    "crt: 1\nmaterials: {a: {type: mix, materials: [b, c]}, b: {type: two_sided, front: c, "
-                    "back: a}, c: {type: diffuse, reflectance: 1}}\n",
-                    "made of itself");
-    context.refused("a mix of what is not there",
-                    "crt: 1\nmaterials: {a: {type: mix, materials: [a1, a2]}}\n", "no material 'a1'");
 }
 
 }  // namespace
@@ -244,14 +230,14 @@ std::vector<Case> compositionCases() {
     return {
         row("G21", "cutoff", "Texels of an opacity below, at and above its cutoff, and between two of them",
             "0 below, 1 from it on, times the factor; linear between texels", "docs/scene.md",
-            "± 0.5 %; refused", Level::Commit, light | CRT_FEATURE_OPACITY | CRT_FEATURE_TEXTURE, cutoffs),
+            "± 0.5 %", Level::Commit, light | CRT_FEATURE_OPACITY | CRT_FEATURE_TEXTURE, cutoffs),
         row("G24", "opacity",
             "Stacked sheets of opacity 0 to 1 before a sky, and over a floor that is lit by lamps, points "
             "and a sky, by light sampling and without",
             "(1 − a)^k of the light", "independent decisions", "± 0.5 %, 2 %", Level::Commit,
             light | CRT_FEATURE_OPACITY | CRT_FEATURE_POINT_LIGHT | CRT_FEATURE_ENVIRONMENT_LIGHT, sheets),
         row("G25", "textured-opacity", "A checker of opacities, seen through and lit through",
-            "1 − a at the place", "independent decisions", "± 0.5 %; refused", Level::Commit,
+            "1 − a at the place", "independent decisions", "± 0.5 %", Level::Commit,
             light | CRT_FEATURE_OPACITY | CRT_FEATURE_POINT_LIGHT | CRT_FEATURE_TEXTURE, texturedOpacity),
         row("G26", "opacity-limits",
             "A lamp of opacity .3, with and without light sampling; a box of opacity 1 and 0",
@@ -261,7 +247,7 @@ std::vector<Case> compositionCases() {
             "Mixes of Lambertian and metallic materials, one in another, by a texture, and two sides; in "
             "light from everywhere and in a glowing room, by light sampling and without",
             "the mean of the albedos, by their shares", "linearity in the BSDF; Fresnel's equations",
-            "± 0.5 %, 1 %; refused", Level::Commit,
+            "± 0.5 %, 1 %", Level::Commit,
             light | CRT_FEATURE_MIX | CRT_FEATURE_CONDUCTOR | CRT_FEATURE_ROUGH_CONDUCTOR |
                 CRT_FEATURE_TEXTURE,
             mixes),

@@ -1,7 +1,6 @@
 #include "verify/context.h"
 
 #include "base/error.h"
-#include "compile/compile.h"
 #include "verify/physics.h"
 
 #include <fmt/format.h>
@@ -252,25 +251,6 @@ void Context::holds(const std::string& what, bool true_, const std::string& tole
     o.tolerance = tolerance;
     o.note = note;
     if (!true_) o.physics = physics;
-    add(std::move(o));
-}
-
-void Context::refused(const std::string& what, const std::string& yaml, const std::string& words) {
-    Outcome o;
-    o.what = what;
-    o.tolerance = fmt::format("refused, saying \"{}\"", words);
-    try {
-        compileScene(scene(yaml), 0);
-        o.verdict = Verdict::Fail;
-        o.physics = "accepted, though nothing sensible can be rendered from it";
-    } catch (const Error& error) {
-        const std::string text = error.what();
-        o.note = text.substr(0, text.find('\n'));
-        o.verdict = text.find(words) != std::string::npos && error.kind() == ErrorKind::Scene
-                        ? Verdict::Refused
-                        : Verdict::Fail;
-        if (o.verdict == Verdict::Fail) o.physics = "refused, but with another message";
-    }
     add(std::move(o));
 }
 

@@ -125,8 +125,6 @@ public:
     /// A yes or no.
     void holds(const std::string& what, bool true_, const std::string& tolerance, const std::string& physics,
                const std::string& note = {});
-    /// The scene is turned down before rendering, with an error that says `words`.
-    void refused(const std::string& what, const std::string& yaml, const std::string& words);
     void notApplicable(const std::string& what, const std::string& reason);
     void add(Outcome outcome);
 

@@ -168,22 +168,6 @@ void images(Context& context) {
         context.relative(fmt::format("turned by {} degrees, half as bright, seen", turn), luminance(film),
                          150, 0.02, {{0, "the texel is elsewhere"}, {300, "the scale is lost"}});
     }
-    // What is turned away is refused.
-    context.refused("an image that is not there", floorUnder("image: nowhere.exr").yaml(), "cannot find");
-    context.refused("an image with a negative texel",
-                    floorUnder("image: " + imageFile(folder, 4,
-                                                     [](int row, int column) {
-                                                         return row == 1 && column == 6 ? -1.0 : 1.0;
-                                                     }))
-                        .yaml(),
-                    "pixel (6, 1)");
-    context.refused("an image with a NaN",
-                    floorUnder("image: " + imageFile(folder, 2,
-                                                     [](int row, int column) {
-                                                         return row == 1 && column == 1 ? std::nan("") : 1.0;
-                                                     }))
-                        .yaml(),
-                    "light is a number");
 }
 
 /// Luminance of the CIE general sky of types 3, 7 and 12 over the zenith's, by the text of the standard.
@@ -266,11 +250,6 @@ void skies(Context& context) {
                          {{luminanceAt(kPi - off), "the sun stands on the other side"},
                           {luminanceAt(off + 2 * kSunPhi), "the sun's azimuth is mirrored"}});
     }
-    context.refused("a sky whose sun has set",
-                    floorUnder("sky: {type: 12, zenith_luminance_cd_m2: 1, "
-                               "direction: [0, 1, 0]}")
-                        .yaml(),
-                    "below the horizon");
 }
 
 }  // namespace

@@ -125,9 +125,6 @@ void roughGlassLimits(Context& context) {
                 .yaml(),
             meanRadiance, fresnelDielectric(std::cos(degrees * kDegree), kIndex), 0.002,
             {.samples = 4096, .most = 65536});
-    context.refused("roughness -0.1",
-                    "crt: 1\nmaterials: {it: {type: rough_dielectric, ior: 1.5, roughness: -0.1}}\n",
-                    "roughness");
 }
 
 /// Where all light is of wavelengths at which the index is the same, those at which it is not must not show:
@@ -262,8 +259,6 @@ void plasticFurnace(Context& context) {
                                         .quad("it", kInterface, "it")
                                         .yaml()),
                      "a coat of index 1 is there");
-    context.refused("ior 0.5", "crt: 1\nmaterials: {it: {type: plastic, reflectance: 1, ior: 0.5}}\n",
-                    "ior");
 }
 
 void absorbingSlab(Context& context) {
@@ -375,11 +370,6 @@ void absorbingSlab(Context& context) {
         std::exp(-0.7 * (1.5 + 1) - 1.5 * 0.5), 0.002, effort,
         {{std::exp(-0.7 * 1.5 - 1.5 * 0.5), "behind the inner body there is nothing"},
          {std::exp(-0.7 * 3 - 1.5 * 0.5), "the inner body absorbs as the outer one does, too"}});
-    context.refused("absorption -1",
-                    "crt: 1\nmaterials: {it: {type: dielectric, ior: 1.5, absorption: -1}}\n", "absorption");
-    context.refused("absorption of a pane",
-                    "crt: 1\nmaterials: {it: {type: thin_dielectric, ior: 1.5, absorption: 1}}\n",
-                    "absorption");
 }
 
 }  // namespace

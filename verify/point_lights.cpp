@@ -141,10 +141,6 @@ void fluxes(Context& context) {
         "a sun of 500 lx, 60 degrees aside",
         squareUnder("{type: sun, direction: [1, -0.57735026918962576, 0], illuminance_lx: 500}"), luminance,
         250 * kArea / lumens, 0.003, {.samples = 64, .most = 16384});
-    context.refused(
-        "a point with 'nee: false'",
-        floorUnder("{type: point, position: [0, 1, 0], power_w: 1}", 0, 0, "{nee: false}").yaml(),
-        "found by light sampling alone");
 }
 
 void directionalAndSun(Context& context) {
@@ -455,7 +451,7 @@ std::vector<Case> pointLightCases() {
         row("E17", "light-units",
             "Points, spots, directional lights and suns by watts, lumens, candelas and lux, caught by a "
             "floor",
-            "the flux that was asked for; a spot with 'nee: false' is refused",
+            "the flux that was asked for",
             "area times irradiance; solid angle of a square", "± 0.2 %, ± 0.3 %", Level::Commit, kLit,
             fluxes),
         row("E18", "sun",

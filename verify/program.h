@@ -7,8 +7,8 @@
 namespace crt::verify {
 
 /// Reads the options of `crt verify`, in their long form with each value as a word of its own, and runs the
-/// cases. Returns the exit code: 0 when every case passes, is refused as documented or does not apply; 7
-/// when one fails or is inconclusive; 128 + signal when interrupted. Throws crt::Error.
+/// cases. Returns the exit code: 0 when every case passes or does not apply; 7 when one fails or is
+/// inconclusive; 128 + signal when interrupted. Throws crt::Error.
 int runSuite(const std::vector<std::string>& words);
 
 }  // namespace crt::verify

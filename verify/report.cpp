@@ -58,7 +58,7 @@ std::string caseText(const CaseResult& result, bool colored) {
 std::string summaryText(const SuiteResult& suite) {
     std::string text;
     for (const Verdict v :
-         {Verdict::Pass, Verdict::Refused, Verdict::NotApplicable, Verdict::Inconclusive, Verdict::Fail})
+         {Verdict::Pass, Verdict::NotApplicable, Verdict::Inconclusive, Verdict::Fail})
         if (const std::size_t n = suite.count(v); n > 0)
             text += fmt::format("{}{} {}", text.empty() ? "" : ", ", n, name(v));
     if (suite.cases.size() < suite.asked)

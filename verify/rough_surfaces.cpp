@@ -69,9 +69,6 @@ void roughFurnace(Context& context) {
                 mistakes(microfacetAlbedo(std::cos(30 * kDegree), 0.2, 3, roughness),
                          roughConductorAlbedo(std::cos(30 * kDegree), 0.2, 3, std::sqrt(roughness))));
         }
-    context.refused("roughness 1.5",
-                    "crt: 1\nmaterials: {it: {type: rough_conductor, metal: Ag, roughness: 1.5}}\n",
-                    "roughness");
 }
 
 std::string roughMetal(double n, double k, double roughness) {

@@ -190,8 +190,6 @@ void indices(Context& context) {
         context.relative(fmt::format("n = {}: a clear cube, the worst pixel", ior), worstRatio(film, empty),
                          1, 2e-4);
     }
-    // Beyond, 1/n² is below what single precision tells from total reflection.
-    context.refused("n = 10000", scene("10000", 8), "ior");
 }
 
 void extremeNumbers(Context& context) {
@@ -263,9 +261,6 @@ void albedoRange(Context& context) {
     };
     context.relative("albedo 0", radiance(context.render(scene("0"), {.samples = 64})), 0, 0);
     context.relative("albedo 1", whiteFurnace(context, "{type: diffuse, reflectance: 1}"), 1, 2e-6);
-    context.refused("albedo 1 + 1e-7", scene("1.0000001"), "reflectance");
-    context.refused("albedo -0.1", scene("-0.1"), "reflectance");
-    context.refused("albedo NaN", scene(".nan"), "reflectance");
 }
 
 }  // namespace
@@ -290,7 +285,7 @@ std::vector<Case> scatteringCases() {
             CRT_FEATURE_DIELECTRIC | CRT_FEATURE_AREA_LIGHT, reciprocity),
         row("G07", "indices",
             "A clear cube of n = 1, 1 + 1e-7, 1.001, 1.5, 2.4, 100, 1000 in a constant environment",
-            "it vanishes; for n = 1 to the bit; 10000 is refused", "conservation of radiance over n²",
+            "it vanishes; for n = 1 to the bit", "conservation of radiance over n²",
             "2e-4 in every pixel; same bits", Level::Commit, sky | CRT_FEATURE_DIELECTRIC, indices),
         row("G08", "extreme-numbers",
             "Random numbers at the ends of their range in every scattering routine", "finite, or rejected",
@@ -298,9 +293,8 @@ std::vector<Case> scatteringCases() {
         row("G09", "below-one", "Words to numbers", "above 0, below 1, mean ½, mean square ⅓",
         "arithmetic",
             "1e-9", Level::Commit, 0, wordsToNumbers),
-        row("G10", "albedo-range", "Albedo 0, 1, 1 + 1e-7, negative, NaN",
-            "black; all of the light; the others are refused", "docs/scene.md", "exactly; 2e-6",
-            Level::Commit, sky | CRT_FEATURE_DIFFUSE, albedoRange),
+        row("G10", "albedo-range", "Albedo 0 and 1", "black; all of the light", "docs/scene.md",
+            "exactly; 2e-6", Level::Commit, sky | CRT_FEATURE_DIFFUSE, albedoRange),
         row("G11", "view-angles", "A03 seen from 30° to 89.9° off the normal, from above and from below",
             "0.2394564705 always", "Lambert's law has no angle of view", "± 0.2 %", Level::Commit,
             light | CRT_FEATURE_NEE, viewAngles),

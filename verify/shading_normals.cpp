@@ -285,12 +285,6 @@ void normalMap(Context& context) {
                     {{lit(world, towards), "the strength is not asked"}});
             }
         }
-    context.refused("a normal map on a mesh without texture coordinates",
-                    Stage(kDown)
-                        .material("it", fmt::format("{{{}, normal_map: {{texture: '{}'}}}}", kWhite, path))
-                        .quad("it", "[[-8,0,-8],[-8,0,8],[8,0,8],[8,0,-8]]", "it")
-                        .yaml(),
-                    "no texture coordinates");
 }
 
 void normalMapEnergy(Context& context) {
@@ -345,7 +339,7 @@ std::vector<Case> shadingNormalCases() {
             "A floor whose map has one normal, under a light from one direction: pictures of either "
             "handedness, turned, and steeper",
             "1/π of the facet's cosine with the light, and with the light in the mirror of the floor",
-            "vectors in double", "± 1e-4; refused", Level::Commit,
+            "vectors in double", "± 1e-4", Level::Commit,
             light | CRT_FEATURE_NORMAL_MAP | CRT_FEATURE_TEXTURE | CRT_FEATURE_POINT_LIGHT, normalMap),
         row("G29", "normal-map-energy",
             "White mapped surfaces of slopes up to 75°, seen from 0° to 85°, in light from everywhere; "

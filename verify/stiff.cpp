@@ -85,8 +85,6 @@ void depths(Context& context) {
         context.render(furnace(0.5, "{max_depth: 1000000000, nee: false}"), {.samples = 64});
     context.holds("depth 1000000000, ended by roulette: the mean exists",
                   luminance(endless) > luminance(emitted), "brighter than what is emitted", "");
-    context.refused("depth -1", furnace(0.5, "{max_depth: -1}"), "max_depth");
-    context.refused("depth 2³¹ − 1", furnace(0.5, "{max_depth: 2147483647}"), "max_depth");
 }
 
 void pathsThatNeverEnd(Context& context) {
@@ -157,9 +155,6 @@ void rouletteDepths(Context& context) {
         context.estimate(fmt::format("unit cube, roulette from event {} on", start), yaml(cube),
                          meanRadiance, .197603, 0.005, {.samples = 1024, .most = 16384});
     }
-    for (const double albedo : {1.0000001, 1.5, -0.1})
-        context.refused(fmt::format("albedo {}: throughput would grow, or be negative", albedo),
-                        furnace(albedo, "{max_depth: 4}"), "reflectance");
 }
 
 void slits(Context& context) {
@@ -263,8 +258,8 @@ std::vector<Case> stiffCases() {
         furnaceCase("F04", "albedo-0.9999", 0.9999, 69074, "at night", albedo9999),
         {.id = "F05",
          .name = "depths",
-         .title = "Depths 0, 1, 2, 10000 and 10⁹; −1 and 2³¹ − 1",
-         .expected = "the furnace's series; the last two are refused",
+         .title = "Depths 0, 1, 2, 10000 and 10⁹",
+         .expected = "the furnace's series",
          .source = "geometric series; docs/scene.md",
          .tolerance = "2e-6",
          .level = Level::Commit,
@@ -290,8 +285,8 @@ std::vector<Case> stiffCases() {
          .run = deepDimensions},
         {.id = "F08",
          .name = "roulette-depths",
-         .title = "Roulette from event 0, 1, 4, 16 or 1000 on; albedo above 1",
-         .expected = "0.197603 in the unit cube wherever it starts; growing throughput is refused",
+         .title = "Roulette from event 0, 1, 4, 16 or 1000 on",
+         .expected = "0.197603 in the unit cube wherever it starts",
          .source = "as A07; docs/scene.md",
          .tolerance = "± 0.5 %",
          .level = Level::Merge,

@@ -134,13 +134,6 @@ void textureLookUps(Context& context) {
                                                     "[0.6,0.6,0.6]], color_space: linear")),
                          expected, 1e-4);
     }
-    context.refused("a texture on a mesh without texture coordinates",
-                    squareSeenAt(0.5, 0.5, fmt::format("{{texture: '{}'}}", path), "1",
-                                 "normals: [[0,1,0],"
-                                 "[0,1,0],[0,1,0],[0,1,0]]"),
-                    "no texture coordinates");
-    context.refused("an image that is not there", squareSeenAt(0.5, 0.5, "{texture: /nowhere.png}", "1"),
-                    "/nowhere.png");
 }
 
 void textureColours(Context& context) {
@@ -196,7 +189,7 @@ std::vector<Case> textureCases() {
             "Images of greys, wrapped three ways, scaled, turned and moved; nearest texels; checkers; "
             "colours "
             "of vertices, in constant light",
-            "the reflectance at the place", "bilinear weights in double arithmetic", "± 1e-4; refused",
+            "the reflectance at the place", "bilinear weights in double arithmetic", "± 1e-4",
             Level::Commit, needs, textureLookUps),
         row("H13", "texture-colours", "Texels of 8 bits under D65, in the image and in the albedo",
             "their linear sRGB", "IEC 61966-2-1", "± 4e-3", Level::Commit, needs | CRT_FEATURE_AOV,

@@ -122,11 +122,6 @@ void airy(Context& context) {
             ratio, expected(0.25), 0.002, effort,
             {{expected(1), "relative_thickness is left out"}, {expected(0), "there is no film"}});
     }
-    context.refused(
-        "a film of -1 nm",
-        "crt: 1\nmaterials: {it: {type: dielectric, ior: 1.5, thin_film: {thickness_nm: -1, ior: "
-        "1.3}}}\n",
-        "thickness_nm");
 }
 
 void filmFurnace(Context& context) {

@@ -104,7 +104,7 @@ OptionGroup output(Request& to) {
 constexpr const char* kVerifyNotes =
             "\nThe suite asks a backend what physics, geometry and arithmetic demand: closed forms, "
             "deterministic quadrature, relations between\n"
-            "images. A case passes, is refused as documented, does not apply (and says why), is "
+            "images. A case passes, does not apply (and says why), is "
             "INCONCLUSIVE (the noise hides the answer) or\n"
             "FAILS; the last two make the exit code 7, and the line below says what the figures suggest. "
             "docs/stability.md describes every case.\n"
