@@ -7,7 +7,7 @@
 // roughly.
 #include "base/error.h"
 #include "base/log.h"
-#include "judge/verify/probes.h"
+#include "verify/probes.h"
 
 #include <fmt/format.h>
 

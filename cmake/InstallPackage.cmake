@@ -1,6 +1,7 @@
 # The installed tree, which runs from any folder it is moved to:
 #   bin/crt                      the program; looks for backends in ../lib/crt (installed by
 #   core/CMakeLists.txt)
+#   bin/crt_conformance          the suite for backends, which `crt verify` runs (verify/CMakeLists.txt)
 #   lib/crt/                     backends (each installs itself, see CrtBackend.cmake)
 #   share/crt/                   meshes and scenes (configs/), named data (data/)
 #   share/doc/crt/               the manual, decisions, and the example of a backend

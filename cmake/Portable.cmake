@@ -55,7 +55,8 @@ if(CMAKE_SCRIPT_MODE_FILE)
     file(COPY ${library} DESTINATION ${tree}/lib FOLLOW_SYMLINK_CHAIN)
   endforeach()
 
-  # The suite goes into a tree of its own and out of the program's, where `cmake --install` puts it.
+  # The suite goes into a tree of its own and out of the program's, where `cmake --install` puts it. `crt
+  # verify` works where both are unpacked in the same place.
   set(tests ${staging}/crt-portable-tests/crt)
   file(COPY ${REFERENCE_BACKEND} DESTINATION ${tests}/lib/crt)
   file(MAKE_DIRECTORY ${tests}/bin)

@@ -1,5 +1,7 @@
-// conformance --backend NAME [--against NAME] [--lean-kernels] [Catch2 options]: one suite for every
-// backend.
+// crt_conformance --backend NAME [--against NAME] [--lean-kernels] [Catch2 options]: the border and the bits
+// of every backend.
+// crt_conformance verify OPTIONS: scenes whose answer is known, for `crt verify` (verify/program.h).
+//
 // Exit code 77 and one sentence when the backend cannot run here, so that a machine without a GPU skips
 // visibly.
 #include "conformance.h"
@@ -7,11 +9,14 @@
 #include "base/error.h"
 #include "base/listener.h"
 #include "catch_runner.h"
+#include "cli/process/run_main.h"
 #include "render/session.h"
+#include "verify/program.h"
 
 #include <cstdio>
 #include <memory>
 #include <optional>
+#include <string_view>
 
 namespace conformance {
 namespace {
@@ -98,6 +103,8 @@ double imageMean(const crt::Film& film) {
 }  // namespace conformance
 
 int main(int argc, char** argv) {
+    if (argc > 1 && std::string_view(argv[1]) == "verify")
+        return crt::runMain([&] { return crt::verify::runSuite({argv + 2, argv + argc}); });
     const crt::Listener listener(crt::standardErrorSink(), crt::LogLevel::Error);
     const crt::ListenerScope scope(listener);
     const auto probe = [] {

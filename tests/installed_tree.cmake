@@ -73,6 +73,7 @@ else()
   render(${WORK_DIR}/crt cornell_figure b.pfm)
   render(${WORK_DIR}/crt cornell_dragon c.pfm)
   run(${CLEAN} ${WORK_DIR}/crt/bin/crt_conformance --backend example [abi])
+  run(${CLEAN} ${WORK_DIR}/crt/bin/crt verify --backend example --case furnace)
 
   # The packed generator makes the packed meshes.
   file(MAKE_DIRECTORY ${WORK_DIR}/elsewhere/meshes)

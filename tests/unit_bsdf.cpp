@@ -6,7 +6,7 @@
 #include "kernel_test.h"
 
 #include "compile/coat.h"
-#include "judge/verify/references.h"
+#include "verify/references.h"
 
 #include <algorithm>
 #include <array>

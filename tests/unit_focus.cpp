@@ -4,7 +4,7 @@
 
 #include "compile/divide.h"
 #include "compile/focus.h"
-#include "judge/verify/shapes.h"
+#include "verify/shapes.h"
 
 #include <algorithm>
 #include <cmath>

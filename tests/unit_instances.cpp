@@ -8,7 +8,7 @@
 
 #include "compile/near_surfaces.h"
 #include "compile/placements.h"
-#include "judge/verify/shapes.h"
+#include "verify/shapes.h"
 
 #include <algorithm>
 #include <array>

@@ -6,8 +6,8 @@
 #include "kernel_test.h"
 
 #include "compile/bvh_build.h"
-#include "judge/verify/shapes.h"
 #include "scene/mesh/mesh_io.h"
+#include "verify/shapes.h"
 
 #include <algorithm>
 #include <array>

@@ -61,6 +61,8 @@ TEST_CASE("the same mesh in every spelling", "[mesh_io]") {
              "# c\n\n  v  0\t0 0 \nv 1 0 0 1.0\nv +0 1e0 0 .5 .5 .5\nf  1 2  3 \n",  // blanks, weights,
                                                                                      // colours
              "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nf 1/1 2/1 3/1\n",                   // texture coordinates
+             "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1/ 2/ 3/\n",                              // without numbers
+             "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1//1 2//1 3//1\n",                        // nor the normal
              "v 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\n",                              // counted from the end
              "f 1 2 3\nv 0 0 0\nv 1 0 0\nv 0 1 0\n",                                 // faces first
              "v 0 0 0\nv 1 0 \\\n0\nv 0 1 0\nf 1 \\\r\n 2 3\n",                      // joined lines

@@ -3,7 +3,7 @@
 #include "kernel_test.h"
 
 #include "compile/compensation.h"
-#include "judge/verify/references.h"
+#include "verify/references.h"
 
 #include <array>
 #include <cmath>

@@ -1,8 +1,8 @@
 // Panes: what passes them, by the kernel on this processor.
 #include "kernel_test.h"
 
-#include "judge/verify/references.h"
 #include "scene/yaml/scene_yaml.h"
+#include "verify/references.h"
 
 #include <fmt/format.h>
 

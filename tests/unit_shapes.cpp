@@ -6,7 +6,7 @@
 #include "scene_texts.h"
 
 #include "compile/shapes.h"
-#include "judge/verify/shapes.h"
+#include "verify/shapes.h"
 
 #include <algorithm>
 #include <array>

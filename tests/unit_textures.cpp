@@ -466,9 +466,13 @@ TEST_CASE("what is wrong about textures is told with its place", "[texture]") {
     CHECK_THAT(refusal(squareWith("{texture: a.png, filtre: nearest}"), in), Contains("'filter'"));
     CHECK_THAT(refusal(squareWith("{texture: a.png, channel: red}"), in), Contains("channel"));
     CHECK_THAT(refusal(squareWith("{texture: a.png, scale: 1e300}"), in), Contains("1000000"));
+    CHECK_THAT(refusal(squareWith("{texture: a.png, cutoff: 0.5}"), in),
+               Contains("'cutoff' is for numbers"));
     CHECK_THAT(refusal(squareWith("{texture: a.png}", ""), in),
                Contains("test.yaml:4:") && Contains("no texture coordinates") && Contains("uvs"));
     CHECK_THAT(refusal(squareWith("{checker: [0.5, {texture: a.png}]}", ""), in),
+               Contains("no texture coordinates"));
+    CHECK_THAT(refusal(squareWith("1, normal_map: {texture: a.png}", ""), in),
                Contains("no texture coordinates"));
     CHECK_THAT(refusal(squareWith("{attribute: colors}"), in), Contains("colours of vertices"));
     CHECK_THAT(refusal(squareWith("{attribute: colours}", ""), in), Contains("colors"));

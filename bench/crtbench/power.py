@@ -18,9 +18,9 @@ ROULETTE = ["integrator.roulette=true", "integrator.roulette_depth=1", "integrat
 
 
 class Fault:
-    def __init__(self, patch, what, scene, why, samples, delta, case, settings=()):
-        self.patch, self.what, self.scene, self.why, self.samples, self.delta, self.case = (
-            patch,
+    def __init__(self, mutant, what, scene, why, samples, delta, case, settings=()):
+        self.mutant, self.what, self.scene, self.why, self.samples, self.delta, self.case = (
+            mutant,
             what,
             scene,
             why,
@@ -138,7 +138,7 @@ def measure(program, arguments):
     results = Results(program, arguments, "power", "Small faults are found")
     rows, data, failures = [], [], 0
     for fault in FAULTS:
-        kernel = program.patched_kernel(program.repository / "tests" / "mutations" / f"{fault.patch}.patch")
+        kernel = program.mutated_kernel(fault.mutant)
         found = [compare(program, fault, kernel, seed) for seed in SEEDS]
         sound = [compare(program, fault, None, seed) for seed in SEEDS]
         known, known_sound = verify(program, fault, kernel), verify(program, fault, None)
@@ -165,7 +165,7 @@ def measure(program, arguments):
             print(rows[-1], flush=True)
         data.append(
             {
-                "fault": fault.patch,
+                "fault": fault.mutant,
                 "scene": fault.scene,
                 "found": [c.json() for c in found],
                 "sound": [c.json() for c in sound],
@@ -200,7 +200,7 @@ def measure(program, arguments):
         + f". `compare` has 16 renders by each backend; the interval is 99.9 % confident. `compare` ran "
           f"with "
           f"seeds {', '.join(map(str, SEEDS))}; words are those of the first, seconds "
-        "the median. The faults are patches in `tests/mutations/`."
+        "the median. The faults are mutants in `tests/mutations/`."
     )
     for fault in FAULTS:
         results.command(

@@ -9,6 +9,7 @@ import resource
 import shutil
 import statistics
 import subprocess
+import sys
 import tempfile
 import time
 
@@ -237,6 +238,20 @@ class Program:
         )
         if done.returncode != 0:
             raise Failure(f"{patch.name} does not fit the kernel any more: {done.stdout.strip()}")
+        return tree / "core" / "kernel"
+
+    def mutated_kernel(self, name):
+        """The same with a fault of tests/mutations."""
+        mutations = self.repository / "tests" / "mutations"
+        sys.path.append(str(mutations))
+        from mutant import Misfit, Mutant
+
+        tree = self.scratch / name
+        shutil.copytree(self.repository / "core" / "kernel", tree / "core" / "kernel")
+        try:
+            Mutant(mutations / f"{name}.mutant").apply(tree)
+        except Misfit as misfit:
+            raise Failure(f"{name}.mutant does not fit the kernel any more: {misfit}") from misfit
         return tree / "core" / "kernel"
 
     def kernels_with(self, extra, masks):

@@ -37,7 +37,4 @@ std::array<int, 4> parseRectangle(const std::string& text, const std::string& op
 std::vector<std::string> writtenOut(std::vector<std::string> arguments,
                                     const std::vector<std::string>& commands);
 
-/// The arguments as one line that a POSIX shell reads back as them.
-std::string shellLine(const std::vector<std::string>& words);
-
 }  // namespace crt

@@ -4,7 +4,8 @@
 #include "base/standard_output.h"
 #include "base/words.h"
 #include "cli/arguments.h"
-#include "cli/python.h"
+#include "cli/process/python.h"
+#include "cli/process/shell_line.h"
 #include "scene/import/import.h"
 
 #include <CLI/CLI.hpp>

@@ -3,7 +3,7 @@
 #include "base/words.h"
 #include "cli/arguments.h"
 #include "cli/commands.h"
-#include "cli/report_page.h"
+#include "cli/process/report_page.h"
 #include "cli/shared_options.h"
 #include "cli/terminal_watch.h"
 #include "judge/converge/engine.h"

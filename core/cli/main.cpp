@@ -1,21 +1,10 @@
 /// The command line: arguments → one of commands.h → exit code. `--help` and `--version` open no backend
 /// and no library.
-#include "base/error.h"
-#include "base/listener.h"
-#include "base/log.h"
-#include "base/parallel.h"
-#include "base/standard_output.h"
 #include "cli/command_line.h"
 #include "cli/commands.h"
-#include "cli/interrupt.h"
-
-#include <fmt/format.h>
+#include "cli/process/run_main.h"
 
 #include <cstdlib>
-#include <exception>
-#include <new>
-#include <optional>
-#include <string>
 
 namespace {
 
@@ -27,12 +16,7 @@ void askForOneQueue() { ::setenv("CUDA_DEVICE_MAX_CONNECTIONS", "1", 0); }
 
 int main(int argc, char** argv) {
     askForOneQueue();
-    crt::openClosedStreams();
-    crt::ignoreWriteSignals();
-    const crt::Listener listener(crt::standardErrorSink());
-    const crt::ListenerScope scope(listener);
-    // One place turns everything that can be thrown into one line and an exit code.
-    try {
+    return crt::runMain([&] {
         crt::CommandLine line;
         for (crt::Command (*command)() :
              {crt::renderCommand, crt::viewCommand, crt::infoCommand, crt::importCommand,
@@ -42,21 +26,6 @@ int main(int argc, char** argv) {
             line.add(command());
         line.add(crt::helpCommand(line));
         line.add(crt::completionCommand(line));
-        const int code = line.run({argv, argv + argc});
-        if (const std::optional<crt::Error> lost = crt::finishStandardOutput()) throw *lost;
-        return code;
-    } catch (const crt::Error& error) {
-        const std::string text = error.what();
-        // Errors in a scene come with places of their own, which editors find only at the start of a line.
-        const bool has_places = text.find(": error: ") != std::string::npos;
-        crt::logMessage(crt::LogLevel::Error,
-                        (has_places ? "the scene cannot be rendered as it is:\n" : "") + text);
-        return error.exitCode();
-    } catch (const std::bad_alloc&) {
-        crt::logMessage(crt::LogLevel::Error, "out of memory on the host");
-        return static_cast<int>(crt::ErrorKind::Device);
-    } catch (const std::exception& error) {
-        crt::logMessage(crt::LogLevel::Error, fmt::format("internal error: {}", error.what()));
-        return static_cast<int>(crt::ErrorKind::Internal);
-    }
+        return line.run({argv, argv + argc});
+    });
 }

@@ -1,7 +1,7 @@
 /// A Watch for people at a terminal: stages and samples as progress, Ctrl-C as a request to stop.
 #pragma once
 
-#include "cli/interrupt.h"
+#include "cli/process/interrupt.h"
 #include "cli/progress.h"
 #include "cli/stage_progress.h"
 #include "render/watch.h"

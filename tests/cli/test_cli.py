@@ -266,7 +266,8 @@ class Verify(CliTest):
         """In a copy of the tree, which its tests may change."""
         tree = os.path.dirname(os.path.dirname(os.path.realpath(harness.CRT)))
         os.makedirs(self.path("tree/bin"))
-        shutil.copy(os.path.join(tree, "bin", "crt"), self.path("tree/bin/crt"))
+        for program in ("crt", "crt_conformance"):
+            shutil.copy(os.path.join(tree, "bin", program), self.path("tree/bin"))
         report = self.path("tree/share/crt/report")
         shutil.copytree(os.path.join(tree, "share", "crt", "report"), report)
         for folder, _, files in os.walk(self.path("tree")):
@@ -295,6 +296,27 @@ class Verify(CliTest):
             os.chmod(path, mode)
         verify()
         self.assertTrue(os.path.exists(self.path("ran")))
+
+    def test_the_suite_is_a_program_beside_crt(self):
+        os.mkdir(self.path("bin"))
+        shutil.copy(harness.CRT, self.path("bin/crt"))
+
+        def run():
+            return subprocess.run(
+                [self.path("bin/crt"), "verify", "--list"],
+                env=harness.environment(),
+                capture_output=True,
+                text=True,
+            )
+        alone = run()
+        self.assertEqual(alone.returncode, 2)
+        self.assert_one_error(alone, f"there is no '{os.path.realpath(self.path('bin/crt_conformance'))}'")
+        self.write("bin/crt_conformance", "#!/bin/sh\necho \"$@\"; exit 7\n")
+        os.chmod(self.path("bin/crt_conformance"), 0o755)
+        beside = run()
+        self.assertEqual((beside.stdout, beside.returncode), ("verify --list\n", 7))
+        os.chmod(self.path("bin/crt_conformance"), 0o777)
+        self.assert_one_error(run(), "everyone can write to")
 
     def test_without_a_page_its_command_is_said_and_the_answer_is_the_same(self):
         for python, why in (("/nowhere/python", "cannot start '/nowhere/python': No such file or directory"),

@@ -9,9 +9,9 @@ import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 FOLDERS = (".github", "bench", "cmake", "configs", "core", "data", "docs", "plugins", "python", "scripts",
-           "tests")
-KINDS = {".c", ".cl", ".cmake", ".cpp", ".csv", ".cu", ".h", ".in", ".json", ".map", ".patch", ".py",
-         ".supp", ".txt", ".yaml", ".yml"}
+           "tests", "verify")
+KINDS = {".c", ".cl", ".cmake", ".cpp", ".csv", ".cu", ".h", ".in", ".json", ".map", ".mutant", ".patch",
+         ".py", ".supp", ".txt", ".yaml", ".yml"}
 BYTES = 109
 PROGRAMS = {".c", ".cl", ".cpp", ".cu", ".h", ".py", ""}
 LINES = 450
@@ -28,7 +28,8 @@ def main():
     files += [f for f in sorted(ROOT.iterdir()) if is_source(f)]
     long = unexplained = 0
     for file in files:
-        marker = 1 if file.suffix == ".patch" else 0  # "+", "-" or a blank, before the line of the source
+        # "+", "-" or a blank, before the line of the source.
+        marker = {".patch": 1, ".mutant": 2}.get(file.suffix, 0)
         lines = file.read_text(errors="replace").splitlines()
         if file.suffix in PROGRAMS and len(lines) > LINES and not any(REASON in line for line in lines[:25]):
             print(f"{file.relative_to(ROOT)}: {len(lines)} lines, and no line '{REASON}…'")

@@ -4,8 +4,8 @@ import math
 
 from . import pages, plots, text
 
-# As in core/judge/verify/case.cpp; worst first.
-VERDICTS = ("FAIL", "INCONCLUSIVE", "not applicable", "refused as documented", "pass")
+# As in verify/case.cpp; worst first.
+VERDICTS = ("FAIL", "INCONCLUSIVE", "not applicable", "pass")
 FAILED = VERDICTS[:2]
 LEFT_OF_ALL = 1e-17  # Where a figure stands that is what was expected, bit for bit.
 

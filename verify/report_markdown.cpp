@@ -1,0 +1,94 @@
+// docs/stability.md: the registry as a manual page, so that it cannot tell anything else than what is
+// tested.
+#include "verify/report.h"
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <utility>
+
+namespace crt::verify {
+namespace {
+
+constexpr const char* kPreamble = R"(# Stability: what is asked of every backend
+
+<!-- Generated from the registry in verify/. Change it there, then run
+     crt verify --markdown --figures embree/verify.json --figures opencl/verify.json > docs/stability.md -->
+
+`crt verify` renders scenes whose answer is known and says whether the backend finds it. It takes any
+backend, also one that crt has never seen:
+
+    crt verify --backend mine --plugin-path build --level merge -o report
+
+A figure that is estimated from samples passes when its 99.9 % interval lies within the tolerance, fails
+when it lies outside, and is inconclusive, which counts as failing, when it is too wide to tell. Exit code 7
+says that something failed. `commit` is the level for every commit, `merge` adds what takes minutes,
+`nightly` what takes longer.
+)";
+
+std::string cell(const std::string& text) {
+    std::string out;
+    for (const char c : text) out += c == '|' ? std::string("\\|") : std::string(1, c);
+    return out;
+}
+
+/// Of the outcome with the largest deviation relative to what was expected: "worst 3.1e-7".
+std::string figureOf(const nlohmann::json& result) {
+    double deviation = -1;
+    for (const nlohmann::json& o : result.at("outcomes")) {
+        if (!o.at("expected").is_number() || !o.at("measured").is_number()) continue;
+        const double expected = o.at("expected"), measured = o.at("measured");
+        const double d = std::abs(measured - expected) / (expected == 0 ? 1 : std::abs(expected));
+        deviation = std::max(deviation, d);
+    }
+    std::string text = result.at("verdict");
+    if (deviation == 0) text += ", exact";
+    if (deviation > 0) text += fmt::format(", {:.1e} off", deviation);
+    return text;
+}
+
+}  // namespace
+
+std::string markdownRow(const Case& c) {
+    return fmt::format("| {} `{}` | {} | {} | {} | {} | {} |", c.id, c.name, cell(c.title), cell(c.expected),
+                       cell(c.source), cell(c.tolerance), name(c.level));
+}
+
+std::string registryMarkdown(const std::vector<std::string>& suites) {
+    std::string text = kPreamble;
+    std::vector<std::string> backends;
+    std::map<std::pair<std::string, std::string>, std::string> figures;
+    for (const std::string& suite : suites) {
+        const nlohmann::json json = nlohmann::json::parse(suite);
+        const std::string backend = json.at("backend").at("name");
+        backends.push_back(backend);
+        text += fmt::format(
+            "\nFigures of {}: level {}, {}, crt {}; the largest deviation "
+            "of a case's answers from what is expected.\n",
+            backend, json.at("level").get<std::string>(), json.at("backend").at("device").get<std::string>(),
+            json.at("crt").at("version").get<std::string>());
+        for (const nlohmann::json& c : json.at("cases")) figures[{backend, c.at("id")}] = figureOf(c);
+    }
+    char group = 0;
+    for (const Case& c : registry()) {
+        if (c.group() != group) {
+            group = c.group();
+            text += fmt::format("\n## {}: {}\n\n| | asked | expected | source | tolerance | level |", group,
+                                groupTitle(group));
+            for (const std::string& b : backends) text += fmt::format(" {} |", b);
+            text += "\n|---|---|---|---|---|---|";
+            for (std::size_t i = 0; i < backends.size(); ++i) text += "---|";
+            text += "\n";
+        }
+        text += markdownRow(c);
+        for (const std::string& b : backends)
+            text += fmt::format(" {} |", figures.count({b, c.id}) != 0 ? figures[{b, c.id}] : "–");
+        text += "\n";
+    }
+    return text;
+}
+
+}  // namespace crt::verify
