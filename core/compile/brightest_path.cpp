@@ -1,6 +1,6 @@
 #include "compile/brightest_path.h"
 
-#include "kernel/path.h"
+#include "kernel/transport/shade.h"
 
 #include <algorithm>
 #include <cmath>
