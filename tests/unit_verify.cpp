@@ -1,8 +1,8 @@
 // The suite of `crt verify` itself: its registry, its verdicts, its diagnoses, and that its expectations are
 // right.
 #include "catch.h"
-#include "kernel/features.h"
-#include "kernel/layout.h"
+#include "kernel/dialect/features.h"
+#include "kernel/dialect/layout.h"
 #include "verify/case.h"
 #include "verify/context.h"
 #include "verify/physics.h"

@@ -4,7 +4,7 @@
 #include "verify/shapes.h"
 #include "verify/variants.h"
 
-#include "kernel/features.h"
+#include "kernel/dialect/features.h"
 
 #include <fmt/format.h>
 

@@ -5,7 +5,7 @@
 #include "verify/references.h"
 #include "verify/scenes.h"
 
-#include "kernel/features.h"
+#include "kernel/dialect/features.h"
 
 #include <fmt/format.h>
 

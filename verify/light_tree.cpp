@@ -5,7 +5,7 @@
 #include "verify/scenes.h"
 #include "verify/shapes.h"
 
-#include "kernel/features.h"
+#include "kernel/dialect/features.h"
 
 #include <fmt/format.h>
 

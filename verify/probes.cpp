@@ -1,7 +1,7 @@
 #include "verify/probes.h"
 
 #include "compile/compile.h"
-#include "kernel/path.h"
+#include "kernel/schedule/pixel.h"
 
 #include <fmt/format.h>
 

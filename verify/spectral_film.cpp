@@ -2,7 +2,7 @@
 #include "verify/context.h"
 #include "verify/scenes.h"
 
-#include "kernel/features.h"
+#include "kernel/dialect/features.h"
 
 #include <fmt/format.h>
 

@@ -4,7 +4,7 @@
 #include "film/resolve.h"
 #include "image/image_io.h"
 #include "image/open_module.h"
-#include "kernel/features.h"
+#include "kernel/dialect/features.h"
 #include "scene/aov.h"
 #include "verify/context.h"
 #include "verify/scenes.h"

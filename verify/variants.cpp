@@ -1,6 +1,6 @@
 #include "verify/variants.h"
 
-#include "kernel/path.h"
+#include "kernel/schedule/pixel.h"
 #include "verify/shapes.h"
 
 #include <memory>
