@@ -188,6 +188,7 @@ TEST_CASE("mix: what a scene may not say", "[composition][yaml]") {
     CHECK(says(refusal("  m: {type: mix, materials: [a, b], amount: 1.5}\n"), "'amount'"));
     CHECK(says(refusal("  m: {type: mix}\n"), "'materials' is missing"));
     CHECK(says(refusal("  m: {type: two_sided, front: a}\n"), "'back' is missing"));
+    CHECK(says(refusal("  m: {type: two_sided, metal: Au}\n"), "unknown key 'metal'"));
     CHECK(says(refusal("  m: {type: two_sided, front: a, back: glass}\n"), "both sides itself"));
     CHECK(says(refusal("  m: {type: mix, materials: [a, veil]}\n"), "give the opacity to 'm'"));
     CHECK(says(refusal("  m: {type: diffuse, reflectance: 1, opacity: -0.1}\n"), "'opacity'"));

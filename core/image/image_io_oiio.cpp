@@ -489,14 +489,13 @@ struct Placement {
         }
     }
 
-    /// A display window costs memory that no pixel of the file pays for: a header of 1 kB may name gigabytes.
+    /// A display window costs memory without pixels in the file: a header of 1 kB may name gigabytes.
     void requireReasonable(const ImageSpec& spec) const {
         constexpr std::int64_t kAlwaysPixels = std::int64_t{1} << 24, kMostTimes = 64;
         const std::int64_t read = std::int64_t{spec.width} * spec.height;
         if (width * height > std::max(kAlwaysPixels, kMostTimes * read))
             throw Failure{fmt::format("its display window has {} x {} pixels, its data window only {} x {}; "
-                                      "above {} million pixels the display window may have {} times the "
-                                      "pixels of the data window",
+                                      "above {} million pixels it may have {} times as many",
                                       width, height, spec.width, spec.height, kAlwaysPixels >> 20,
                                       kMostTimes)};
     }
