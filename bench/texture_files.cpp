@@ -1,5 +1,5 @@
 // Writes images of 4096 x 4096 texels, as photographs are: gradients, edges, fine detail and noise; and a
-// scene that shows each on a square. For docs/results/textures.md.
+// scene that shows each on a square. For docs/results/speed.md.
 //
 //     texture_files FOLDER [jpg|png] [COUNT]
 #include "image/image_io.h"

@@ -4,7 +4,7 @@
 #   crt-portable.tar.gz        the program, its backends, scenes, meshes, and the libraries they need but
 #   glibc's and the compiler's
 #   crt-portable-tests.tar.gz  the conformance suite and its reference backend, to be unpacked over the first
-#   crt-portable-bench.tar.gz  the programs of bench/paper, likewise
+#   crt-portable-bench.tar.gz  the programs of bench/run paper, likewise
 #
 # Unpacked anywhere, bin/crt runs, if the machine's glibc and libstdc++ are not older than this one's.
 # OpenImageIO and the 250 libraries it brings stay behind, being larger than all the rest: images are written

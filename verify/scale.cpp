@@ -435,7 +435,7 @@ void areasOfShapes(Context& context) {
 void layers(Context& context) {
     const std::uint64_t rays = context.byLevel(40000, 800000, 800000);
     // Below 6e-6 of their size layers of a scene of that size begin to be skipped:
-    // docs/results/stability-offset-tightness.md.
+    // docs/results/limits.md.
     for (const double gap : {1e-3, 1e-4, 1e-5, 8e-6})
         rareFailures(
             context, fmt::format("layers {:g} of their size apart", gap),
@@ -571,7 +571,7 @@ std::vector<Case> scaleCases() {
          .name = "thin-layers",
          .title = "Parallel layers 1e-3, 1e-4, 1e-5 and 8e-6 of their size apart",
          .expected = "a ray through the outer layer meets the inner one",
-         .source = "geometry; the limit is that of docs/results/stability-offset-tightness.md",
+         .source = "geometry; the limit is that of docs/results/limits.md",
          .tolerance = "rate of skipped layers ≤ 1e-5",
          .level = Level::Commit,
          .needs = CRT_FEATURE_BVH | CRT_FEATURE_DIELECTRIC | CRT_FEATURE_AREA_LIGHT | CRT_FEATURE_AOV,

@@ -7,12 +7,11 @@ scene says how, and that is what is reported. Times nothing: it may run on a bus
 
 Needs a Python with mitsuba, numpy and PyYAML (--python), and an LLVM for Mitsuba's llvm variant."""
 
-from .command import exit_code, program_for
-from .peer_environment import mitsuba_parser, under_mitsuba
+from .mitsuba_environment import add_python_option, under_mitsuba
 
 
-def main():
-    parser = mitsuba_parser("bench/agree", __doc__, busy="nothing happens")
+def options(parser):
+    add_python_option(parser)
     parser.add_argument(
         "--variant",
         default="llvm_ad_spectral",
@@ -26,11 +25,12 @@ def main():
     )
     parser.add_argument("--renders", type=int, default=16, help="of each scene by each program (16)")
     parser.add_argument("--scenes", nargs="*", help="only these, by name without .yaml")
-    arguments = parser.parse_args()
 
-    def measure():
-        under_mitsuba("agree", arguments.python)
-        from . import agree  # Needs what only the right Python has.
-        return agree.measure(program_for(arguments), arguments)
 
-    return exit_code("bench/agree", arguments, measure)
+def prepare(arguments):
+    under_mitsuba(arguments)
+
+
+def measure(program, arguments):
+    from . import agree  # Needs what only the right Python has.
+    return agree.measure(program, arguments)

@@ -26,6 +26,7 @@ MEMORY_AT_MOST = 8 << 30  # Of addresses, so that a model that asks for all ther
 BACKENDS = ["embree", "opencl", "cuda"]
 EXTENSIONS = (".glb", ".gltf", ".obj", ".ply")
 SHEET_COLUMNS = 10
+SHOWN = 12  # Sentences of a section in docs/results.
 
 
 class Model:
@@ -101,6 +102,14 @@ def sheet(models):
             + chunk(b"IDAT", zlib.compress(b"".join(lines), 9)) + chunk(b"IEND", b""))
 
 
+def options(parser):
+    parser.add_argument("folders", nargs="+", type=pathlib.Path, metavar="FOLDER",
+                        help="looked through for models and scenes; named REPOSITORY@COMMIT")
+    parser.add_argument("--note", help="a paragraph for the page, about what is in the folders")
+    parser.add_argument("--pictures", type=pathlib.Path, metavar="FOLDER",
+                        help="keeps the images, and a sheet of them")
+
+
 def measure(program, arguments):
     backend = program.backends(BACKENDS)[0][0]
     results = Results(program, arguments, "assets", "Models and scenes of other people")
@@ -139,13 +148,14 @@ def measure(program, arguments):
     )
     named = [(name, m) for name, models in corpora.items() for m in models]
     results.heading("Not rendered")
-    results.paragraph("Those that are alike but for numbers (N) and names (…); assets.json has each file.")
+    results.paragraph("Those that are alike but for numbers (N) and names (…); the JSON has each file.")
     rows = grouped((name, m, m.verdict(), m.error) for name, m in named if not m.renders())
     results.table(["files", "for example", "verdict", "what crt says"], rows)
     results.heading("Not as in the file")
     rows = grouped((name, m, "", part) for name, m in named if m.renders()
                    for part in {part for w in m.warnings for part in parts(w)})
     results.table(["files", "for example", "what crt says"], [[row[0], row[1], row[3]] for row in rows])
+    claims(results, arguments, backend, corpora)
     if scenes:
         results.heading("Scenes of pbrt and Mitsuba")
         results.paragraph(
@@ -156,6 +166,16 @@ def measure(program, arguments):
             f"when more than {foreign_scenes.WHITE:.0%} of its values are.")
         results.table(["scene", "crt", "ratio", "what changes the picture a lot"],
                       [[cell(str(c)) for c in row] for row in foreign_scenes.table(scenes)])
+        results.claim(
+            "Public scenes of pbrt and Mitsuba",
+            f"Each after `crt import`, {foreign_scenes.SIDE} pixels on the longer side, "
+            f"{foreign_scenes.SAMPLES} samples. *Ratio*: the mean luminance over that of the reference "
+            f"image that "
+            "comes with the scene.",
+            ["scene", "crt", "ratio", "what changes the picture a lot"],
+            [[cell(str(c)) for c in row] for row in foreign_scenes.table(scenes)],
+            name="assets-scenes",
+        )
     results.data = {
         name: [{"file": m.name, "verdict": m.verdict()}
                | ({"error": m.error} if not m.renders() else {"warnings": m.warnings} if m.warnings else {})
@@ -176,6 +196,43 @@ def measure(program, arguments):
     results.write()
     fine = all(m.renders() or m.refused() for m in everything) and all(s.holds() for _, s in scenes)
     return 0 if fine else 1
+
+
+def claims(results, arguments, backend, corpora):
+    """The sections of docs/results: files by repository, refusals and losses, the most frequent ones."""
+    everything = [m for models in corpora.values() for m in models]
+    named = [(name, m) for name, models in corpora.items() for m in models]
+    results.claim(
+        f"{sum(m.renders() for m in everything)} of {len(everything)} public models render",
+        [f"Every glTF, GLB, OBJ and PLY below each folder by `crt MODEL`, {RESOLUTION} × {RESOLUTION} "
+         f"pixels, {SAMPLES} "
+         f"samples, on `{backend}`. A file renders when crt ends with code 0, all pixels are finite and "
+         f"they are "
+         "not all of one colour; it is refused when crt ends with code 3 and says why. These files are not "
+         "part "
+         "of crt.",
+         *([arguments.note] if arguments.note else [])],
+        ["repository@commit", "files", "render", "refused", "other"],
+        [[name, len(models), *counts(models)]
+         for name, models in [*corpora.items(), ("together", everything)]],
+    )
+    refused = grouped((name, m, m.verdict(), m.error) for name, m in named if not m.renders())
+    results.claim(
+        "Why crt refuses models",
+        f"The {SHOWN} most frequent sentences of {len(refused)}; N stands for numbers, … for names.",
+        ["files", "what crt says"],
+        [[row[0], row[3]] for row in refused[:SHOWN]],
+        name="assets-refused",
+    )
+    lost = grouped((name, m, "", part) for name, m in named if m.renders()
+                   for part in {part for w in m.warnings for part in parts(w)})
+    results.claim(
+        "What crt leaves out of models",
+        f"The {SHOWN} most frequent sentences of {len(lost)} about models that render.",
+        ["files", "what crt says"],
+        [[row[0], row[3]] for row in lost[:SHOWN]],
+        name="assets-lost",
+    )
 
 
 def counts(models):

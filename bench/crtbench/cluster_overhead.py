@@ -14,7 +14,6 @@ ticks far apart, and with workers that keep the memory of films. With --gpus a p
 is compared with workers that have one GPU each, as CUDA_VISIBLE_DEVICES says, and the last column is of the
 GPUs' time."""
 
-import argparse
 import contextlib
 import os
 import statistics
@@ -99,9 +98,7 @@ def measured(client, render):
             sum(client.run(seconds_of_renders).values()))
 
 
-def main():
-    parser = argparse.ArgumentParser(prog="bench/cluster_overhead", description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+def options(parser):
     parser.add_argument("--scene", default="configs/cornell_box.yaml")
     parser.add_argument("--resolution", type=int, default=512)
     parser.add_argument("--seconds", type=float, default=60, help="of the plain render, about (60)")
@@ -109,7 +106,9 @@ def main():
     parser.add_argument("--runs", type=int, default=3)
     parser.add_argument("--backend", default="embree")
     parser.add_argument("--gpus", action="store_true", help="a GPU for each worker")
-    arguments = parser.parse_args()
+
+
+def alone(arguments):
 
     scene = crt.load(arguments.scene, set={"film.resolution": [arguments.resolution] * 2})
     threads = 0 if arguments.gpus else min(arguments.workers, len(os.sched_getaffinity(0)))

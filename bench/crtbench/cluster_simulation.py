@@ -12,7 +12,6 @@ real films instead, all on the processors of this machine, and none is sent. Tas
 a thousand threads that wait for one interpreter would be measured. At the end every sample is there once, or
 the run fails."""
 
-import argparse
 import asyncio
 import contextlib
 import logging
@@ -226,10 +225,7 @@ def simulate(client, seconds, speeds):
     return samples / sum(speeds), result.report["seconds"]["total"], result.report["distributed"]
 
 
-def main():
-    global FILMS
-    parser = argparse.ArgumentParser(prog="bench/cluster_simulation", description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+def options(parser):
     parser.add_argument("--workers", type=int, default=1000)
     parser.add_argument("--processes", type=int, default=len(os.sched_getaffinity(0)),
                         help="that the workers share (one a processor)")
@@ -239,7 +235,10 @@ def main():
     parser.add_argument("--spread", type=float, default=0.2, help="of the workers' speeds (0.2)")
     parser.add_argument("--bandwidth", type=float, default=125e6, help="bytes a second of a node (125e6)")
     parser.add_argument("--real-sums", action="store_true", help="add real films, on this machine")
-    arguments = parser.parse_args()
+
+
+def alone(arguments):
+    global FILMS
     FILMS = Films(arguments.resolution, cluster_work.BRANCH if arguments.real_sums else 2,
                   arguments.real_sums, arguments.bandwidth)
     print(f"a film: {len(FILMS.packed) / 1e6:.1f} MB packed; {FILMS.sums.add_seconds:.3f} s to add, "

@@ -1,4 +1,4 @@
-"""What bench/run and bench/peers have in common on the command line."""
+"""What the commands of bench/run have in common."""
 import pathlib
 import sys
 
@@ -7,8 +7,7 @@ from .program import Failure, Program
 REPOSITORY = pathlib.Path(__file__).resolve().parents[2]
 
 
-def add_options(parser, busy):
-    """`busy`: what happens to runs during which others used the processor."""
+def add_options(parser):
     parser.add_argument(
         "--build", type=pathlib.Path, default=REPOSITORY / "build", help="build folder (build)"
     )
@@ -20,8 +19,8 @@ def add_options(parser, busy):
     parser.add_argument(
         "--results",
         type=pathlib.Path,
-        default=REPOSITORY / "docs" / "results",
-        help="where results go (docs/results)",
+        metavar="FOLDER",
+        help="write everything there, and change no page of docs/results",
     )
     parser.add_argument(
         "--tiny",
@@ -34,7 +33,7 @@ def add_options(parser, busy):
         type=float,
         default=0.05,
         metavar="SHARE",
-        help=f"{busy} when other processes took more than this share of the processor (0.05)",
+        help="repeat or mark a timed run when others took more than this share of the processor (0.05)",
     )
 
 
@@ -48,7 +47,7 @@ def program_for(arguments):
 
 def exit_code(name, arguments, measure):
     """Of measure(), which says what is wrong by a Failure."""
-    if arguments.tiny:
+    if getattr(arguments, "tiny", False):
         arguments.results = REPOSITORY / "out" / "tiny"
         arguments.busy = float("inf")
     try:

@@ -1,14 +1,8 @@
 """Figure 2 of the paper that crt grew out of: render time against samples per pixel, 1 … 1024, of the
-Cornell box at 1440 × 1440, and at 2880 × 2880, for every backend. --rows takes measurements of the same
-kind made on another machine (JSON Lines with backend, resolution, spp, repeat, render).
-"""
-
-import json
-import pathlib
+Cornell box at 1440 × 1440, and at 2880 × 2880, for every backend."""
 
 from . import log_log
-from .program import Failure, Spread, significant
-from .results import Results
+from .program import Spread, significant
 
 SCENE = "cornell_box"
 COUNTS = [2**k for k in range(11)]
@@ -17,20 +11,6 @@ COLOURS = {
     "opencl": ("#00785a", "#2fc39b"),
     "cuda": ("#b34700", "#ff9455"),
 }
-
-
-def measure(program, arguments):
-    log_log.library()  # What is missing is said before hours are spent.
-    resolutions = (72, 144) if arguments.tiny else (1440, 2880)
-    # Seconds that one render may take: a processor does not get to 1024.
-    longest = 0.2 if arguments.tiny else 16.0
-    usable, absent = program.backends(["cuda", "embree", "opencl"])
-    rows = timings(program, usable, resolutions, longest)
-    if arguments.rows:
-        rows += [json.loads(line) for line in pathlib.Path(arguments.rows).read_text().splitlines()]
-    if not rows:
-        raise Failure("no backend can run here")
-    write(program, arguments, rows, absent)
 
 
 def few_runs(spp, _seconds):
@@ -111,29 +91,6 @@ def line_fit(points):
 def slope(points):
     """d log t / d log N over the upper half of the points."""
     return log_log.PowerLaw(points[len(points) // 2 - 1:] if len(points) > 3 else points).exponent
-
-
-def write(program, arguments, rows, absent):
-    results = Results(program, arguments, "figure2", "Time against samples: the paper's Figure 2")
-    lines = medians(rows)
-    results.paragraph(
-        "Render seconds by the backend's report, median of repeats. A render that would take over 16 s on a "
-        "processor was left out."
-    )
-    results.paragraph("![Seconds against samples per pixel](figure2.svg)")
-    data = show(results, lines)
-    results.heading("The doubling")
-    results.lines += [*doublings(lines, data), ""]
-    results.not_measured(
-        {name: reason for name, reason in absent.items() if not any(b == name for b, _ in lines)}
-    )
-    results.command(
-        f"crt render configs/{SCENE}.yaml --backend BACKEND --spp N --set 'film.resolution=[1440,1440]' "
-        f"--set 'outputs.0.aovs=[]' -o unseen.pfm"
-    )
-    results.data = {"rows": rows, "fits": data}
-    results.write()
-    (arguments.results / "figure2.svg").write_text(draw(lines))
 
 
 def show(results, lines):

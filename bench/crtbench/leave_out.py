@@ -10,6 +10,7 @@ from .program import Failure, Program, Spread, feature_bits, significant
 from .results import Results
 
 SCENES = ["cornell_box", "cornell_dragon", "cornell_glass"]
+BACKENDS = ["cuda", "opencl", "embree"]
 NO_AOVS = "outputs.0.aovs=[]"   # AOVs are a feature among others.
 ROWS_OF_WAVES = {"AOV", "LIGHT_TREE"}   # Features for which the host keeps more of a path between kernels.
 
@@ -41,6 +42,18 @@ def compile_ahead(program, kernels, settings):
 def gain(more, lean):
     """What `more` costs over `lean`, run by run."""
     return Spread(m / l for m, l in zip(more, lean))
+
+
+def options(parser):
+    parser.add_argument("--scenes", nargs="*", help="only these scenes, by name without .yaml")
+    parser.add_argument("--quick", action="store_true", help="three runs, and no registers from NVRTC")
+    parser.add_argument(
+        "--features", nargs="+", metavar="NAME",
+        help="only these of core/kernel/dialect/features.h, such as THIN_FILM",
+    )
+    parser.add_argument(
+        "--backends", nargs="+", choices=BACKENDS, default=BACKENDS, metavar="NAME", help="only these"
+    )
 
 
 def measure(program, arguments):
@@ -129,6 +142,15 @@ def measure(program, arguments):
     )
     results.table(
         ["scene", "backend", "same bits", "s, lean", "s, full", "full : lean", "MB, lean", "MB, full"], rows
+    )
+
+    results.claim(
+        "A kernel for the scene is faster than the full kernel",
+        f"{size} × {size} pixels, no AOVs; seconds of rendering, median of {runs} interleaved runs. The "
+        f"images "
+        "have the same bits.",
+        ["scene", "backend", "s, kernel of the scene", "s, full kernel", "full : own"],
+        [[scene, backend, *cells[1:4]] for scene, backend, *cells in rows],
     )
 
     # Registers.
@@ -223,6 +245,16 @@ def measure(program, arguments):
         rows.append([f"`{name}`: {what}", *(feature_cell(entry["scenes"][scene]) for scene in scenes)])
         print(rows[-1], flush=True)
     results.table(["feature", *scenes], rows)
+    results.claim(
+        "What one unused feature costs a kernel",
+        f"The scene's own kernel with one feature that the scene does not use, over the kernel without it: "
+        f"seconds of rendering on `{timed}`, {size} × {size} pixels, no AOVs, median of {runs} interleaved "
+        f"runs.",
+        ["feature", *scenes],
+        [[f"`{name}`", *(feature_cell(entry["scenes"][scene]) for scene in scenes)]
+         for name, entry in data["features"].items()],
+        name="leave-out-features",
+    )
     results.not_measured(absent)
     for scene in scenes:
         results.command(

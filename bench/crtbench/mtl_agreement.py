@@ -17,7 +17,7 @@ import subprocess
 
 from .meshes import bounds
 from .mtl_worker import faces_by_material, materials, not_diffuse, statements
-from .peer_environment import python_with_mitsuba
+from .mitsuba_environment import add_python_option, python_with_mitsuba
 from .program import Failure
 from .results import Results
 
@@ -266,6 +266,16 @@ def measure_models(program, arguments, python, backend, results):
             }
     if not table:
         return
+    results.claim(
+        "Public models look the same in crt and Mitsuba 3",
+        f"{MODEL_SIZE} × {MODEL_SIZE} pixels, {samples} samples, light of luminance 1 from everywhere; "
+        f"only Kd of "
+        "the MTL counts on both sides. Mean luminance, and crt over Mitsuba, less one.",
+        ["model", "triangles", "crt", "Mitsuba", "crt over Mitsuba", "worst block of 16 × 16",
+         "Mitsuba over itself, worst block"],
+        [row[:-1] for row in table],
+        name="mtl-agreement-models",
+    )
     results.heading("Models of other people")
     results.paragraph(
         "OBJ and MTL files from public repositories (repository@commit), none of them part of crt. "
@@ -293,6 +303,21 @@ def measure_models(program, arguments, python, backend, results):
             "crt over Mitsuba in RGB",
         ],
         table,
+    )
+
+
+def options(parser):
+    add_python_option(parser)
+    parser.add_argument("--samples", type=int, default=1024, help="per pixel, in both programs (1024)")
+    parser.add_argument("folders", nargs="*", type=pathlib.Path, metavar="FOLDER",
+                        help="looked through for *.obj with an MTL; named REPOSITORY@COMMIT")
+    parser.add_argument("--model-samples", type=int, default=256, help="as --samples, of the models (256)")
+    parser.add_argument(
+        "--view", action="append", default=[], type=named_view, metavar="NAME=X,Y,Z,X,Y,Z,FOV",
+        help="camera of NAME.obj: where it is, what it looks at, degrees",
+    )
+    parser.add_argument(
+        "--pictures", type=pathlib.Path, metavar="FOLDER", help="PNGs of the models by both programs"
     )
 
 
@@ -330,6 +355,17 @@ def measure(program, arguments):
         "spectra that are made from them: the last line is how much that is."
     )
     results.table(["this", "over that", "whole image", *PATCHES, "worst block"], table)
+    results.claim(
+        "crt and Mitsuba 3 read an MTL alike",
+        f"McGuire's Cornell box (public domain; `{FOLDER}`) with three forms of its MTL, {SIZE} × {SIZE} "
+        f"pixels, "
+        f"{samples} samples, crt on `{backend}`, Mitsuba {version} in wavelengths. Luminance of crt over "
+        f"that of "
+        "Mitsuba, less one: of the whole image and of patches that show one material.",
+        ["MTL", "whole image", *PATCHES],
+        [[row[0].removeprefix("crt, "), *row[2:-1]] for row in table
+         if row[0].startswith("crt") and row[1].endswith("wavelengths")],
+    )
     reference = mitsuba.luminance("scalar_spectral", "cornell_original")
     results.data = {
         "relative_difference": rows,

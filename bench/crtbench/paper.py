@@ -1,5 +1,5 @@
-"""What bench/paper measures: rows, a JSON object each, that crtbench/paper_page.py makes a page of. A row's
-`part` says what it is of; `absent` is what could not be measured, with the reason."""
+"""Measures the paper's experiments: rows, a JSON object each, of which crtbench/paper_page.py makes a page.
+`part` of a row names its part of the paper; `absent` is what could not be measured, with the reason."""
 
 import datetime
 import json
@@ -60,7 +60,7 @@ def read_rows(file):
         except json.JSONDecodeError as error:
             raise Failure(f"{file}, line {number}, is no JSON: {error}") from error
         if not isinstance(row, dict) or "part" not in row:
-            raise Failure(f"{file}, line {number}, is no row of bench/paper: it has no part")
+            raise Failure(f"{file}, line {number}, is no row of bench/run paper: it has no part")
         rows.append(row)
     return rows
 

@@ -8,7 +8,6 @@ the page of what they wrote, here."""
 import argparse
 import pathlib
 
-from .command import add_options, exit_code, program_for
 from .paper import PARTS
 
 BACKENDS = ["cuda", "embree", "opencl"]
@@ -27,11 +26,7 @@ def names_of(known):
     return read
 
 
-def main():
-    parser = argparse.ArgumentParser(
-        prog="bench/paper", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    add_options(parser, busy="the page says so")
+def options(parser):
     parser.add_argument("--quick", dest="tiny", action="store_true", help="the same as --tiny")
     parser.add_argument(
         "--backends",
@@ -72,24 +67,21 @@ def main():
         help="make the page of these, measured before, and measure nothing",
     )
     parser.add_argument("--note", help="a paragraph for the page, about the machine say")
-    arguments = parser.parse_args()
 
-    def measure():
-        # Not before the command line has been read: their errors are ours.
-        from . import log_log, paper, paper_page
 
-        program = program_for(arguments)
-        if arguments.rows:
-            rows = [row for file in arguments.rows for row in paper.read_rows(file)]
-            folders = [file.parent for file in arguments.rows]
-        else:
-            if "figure2" in arguments.parts and not arguments.write_rows:
-                log_log.library()  # Of the page that is made afterwards.
-            folder = arguments.write_rows.resolve().parent if arguments.write_rows else program.scratch
-            folder.mkdir(parents=True, exist_ok=True)
-            rows, folders = paper.measure(program, arguments, folder), [folder]
-        if arguments.write_rows and not arguments.rows:
-            return 0
-        return paper_page.write(program, arguments, rows, folders)
+def measure(program, arguments):
+    # Not before the command line has been read: their errors are ours.
+    from . import log_log, paper, paper_page
 
-    return exit_code("bench/paper", arguments, measure)
+    if arguments.rows:
+        rows = [row for file in arguments.rows for row in paper.read_rows(file)]
+        folders = [file.parent for file in arguments.rows]
+    else:
+        if "figure2" in arguments.parts and not arguments.write_rows:
+            log_log.library()  # Of the page that is made afterwards.
+        folder = arguments.write_rows.resolve().parent if arguments.write_rows else program.scratch
+        folder.mkdir(parents=True, exist_ok=True)
+        rows, folders = paper.measure(program, arguments, folder), [folder]
+    if arguments.write_rows and not arguments.rows:
+        return 0
+    return paper_page.write(program, arguments, rows, folders)

@@ -1,8 +1,8 @@
-"""Makes docs/results/paper.md of the rows of bench/paper: the paper's figure beside each of ours."""
+"""Makes docs/results/paper.md of the rows of `bench/run paper`: the paper's figure beside each of ours."""
 
 import statistics
 
-from . import figure2, paper_pictures
+from . import figure2, paper_pictures, section
 from .accelerators import KINDS
 from .paper import PARTS, SETTINGS
 from .program import significant
@@ -18,7 +18,6 @@ LAYOUTS = {
     "soa": "x … y … z …, 4 bytes a load",
     "soa, wide": "x … y … z …, 16 bytes a load",
 }
-ASKED = 0.9   # Of the copy's bandwidth, of the largest sum.
 
 
 class Found:
@@ -61,7 +60,7 @@ def table1(results, found):
         "shuffles, blocks by the last to finish, one pass (`bench/paper_kernels.h`); CUB's is "
         "`cub::DeviceReduce::Sum`. The processor's numbers are in its caches where they fit, the GPU's in "
         "its L2: rates above that of memory are those of a cache. Uploads from pageable memory are in "
-        "`paper.json`."
+        "`out/bench/paper.json`."
     )
     copies = {}
     for row in found.all("copy"):
@@ -117,7 +116,7 @@ def table1(results, found):
                 data[f"{method}_share_of_copy"] = share
                 rate = significant(4 * n / s / 1e9)
                 said.append(f"{name} reads {rate} GB/s, {share:.0%} of the faster copy")
-        results.paragraph(f"At N = {n:,.0f} {' and '.join(said)}; {ASKED:.0%} were asked.")
+        results.paragraph(f"At N = {n:,.0f} {' and '.join(said)}.")
     return data
 
 
@@ -144,7 +143,7 @@ def table2(results, found):
                 ("one stream", "upload, pageable"), ("one stream", "upload"), ("four streams", "upload")
             )
         ]
-        theirs = [UNKNOWN] * 3 if mesh in MESHES else ["not asked"] * 3
+        theirs = [UNKNOWN] * 3 if mesh in MESHES else ["–"] * 3
         times = [*cpu, there, *uploads]
         rows.append(
             [f"{mesh}, {triangles:,.0f}", *theirs, *(time_text(s) for s in times),
@@ -172,7 +171,8 @@ def table3(results, found):
     results.paragraph(
         f"Milliseconds of rendering a million camera paths ({' '.join(SETTINGS)}, Sobol points), median of "
         "interleaved runs; the same image whatever is chosen. Sizes and samples differ, so that no render "
-        "takes minutes: they are in `paper.json`. Of the paper's rates two are known, on the GPU of its "
+        "takes minutes: they are in `out/bench/paper.json`. Of the paper's rates two are known, on the GPU "
+        "of its "
         "time "
         "and at five events: 48 Mpaths/s of the Cornell box and 0.14 of a dragon, without the way in which "
         "they were found; they stand here as milliseconds, too."
@@ -365,7 +365,7 @@ def begin(results, found):
             "processor are not to be published."
         )
     if wrong := wrong_rows(found):
-        results.paragraph(f"**Wrong:** {len(wrong)} results are not what they must be: see `paper.json`.")
+        results.paragraph(f"**Wrong:** {len(wrong)} results are wrong: see `out/bench/paper.json`.")
     gpus = dict.fromkeys(
         f"{r['method']}, {r['multiprocessors']:.0f} multiprocessors, {r['l2_bytes'] / 2**20:.0f} MiB of L2, "
         "compiled with CUDA "
@@ -409,14 +409,15 @@ def end(results, found, arguments):
     for (what, reason), parts in absent.items():
         results.paragraph(
             f"Not measured: {', '.join(parts)}, `{what}`: {reason}. The command, where it can run: "
-            "`bench/paper "
+            "`bench/run paper "
             f"--parts {','.join(parts)}`."
         )
     for part in PARTS:
         if not any(part in (r["part"], r.get("of")) for r in found.rows):
             why = "the run ended before" if part in asked else "it was not asked for"
             results.paragraph(
-                f"Not measured: {part} ({PARTS[part]}): {why}. The command: `bench/paper --parts {part}`."
+                f"Not measured: {part} ({PARTS[part]}): {why}. The command: `bench/run paper --parts "
+                f"{part}`."
             )
     if arguments.note:
         results.paragraph(arguments.note)
@@ -426,14 +427,14 @@ def write(program, arguments, rows, rows_folders):
     """The page; 1 where a result is wrong. The pictures are in one of the folders."""
     found = Found(rows)
     results = Results(program, arguments, "paper", "The paper's experiments, today")
-    results.tool = "bench/paper"
+    folder = arguments.results or section.PAGES  # Of the charts and pictures, too.
     begin(results, found)
     results.data = {
         "table1": table1(results, found),
         "table2": table2(results, found),
         "table3": table3(results, found),
-        "figure2": time_against_samples(results, found, arguments.results),
-        "figure3": figure3(results, found, rows_folders, arguments.results),
+        "figure2": time_against_samples(results, found, folder),
+        "figure3": figure3(results, found, rows_folders, folder),
         "remarks": remarks(results, found),
         "rows": rows,
     }
@@ -445,5 +446,5 @@ def write(program, arguments, rows, rows_folders):
         f"'outputs.0.aovs=[]' {' '.join(f'--set {s}' for s in SETTINGS)} --set "
         "integrator.accelerator=none|aabb|bvh|auto -o unseen.pfm"
     )
-    results.write()
+    results.write(whole_page=True)
     return 1 if wrong_rows(found) else 0

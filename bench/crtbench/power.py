@@ -179,7 +179,17 @@ def measure(program, arguments):
         f"**{len(FAULTS) - failures} of {len(FAULTS)} faults are found by both commands, for all "
         f"{len(SEEDS)} seeds of `compare`, and nothing is found where there is none. The slowest of all "
         f"took "
-        f"{worst:.1f} s; {LIMIT_SECONDS} s are allowed.**"
+        f"{worst:.1f} s.**"
+    )
+    results.claim(
+        f"Small faults are found in seconds: {len(FAULTS) - failures} of {len(FAULTS)}",
+        "Each fault is planted in a copy of the kernel that OpenCL compiles at run time; Embree stays "
+        "sound. "
+        "`crt compare` sees the two backends differ, `crt verify` knows the answer in closed form. Without "
+        "the "
+        "fault both commands pass. Seconds are of the whole process, with the kernels compiled.",
+        ["fault", "command", "verdict", "seconds", "without the fault"],
+        [[row[0], row[1], row[2], row[4], row[6]] for row in rows],
     )
     results.table(
         [

@@ -1,5 +1,5 @@
 """How long do crt and Mitsuba 3 take to an error of 1 %? Scenes of bench/scenes/race, translated as for
-bench/agree, are rendered by both in turn with growing numbers of samples until the error of the image is
+`agree`, are rendered by both in turn with growing numbers of samples until the error of the image is
 below the target; the time between the last two numbers is interpolated, never extrapolated. Times are those
 of rendering alone: scenes are loaded and kernels compiled before.
 
@@ -9,12 +9,11 @@ is measured against itself, so that differences between the models cost nobody.
 
 Needs a Python with mitsuba, numpy and PyYAML (--python), and an LLVM for Mitsuba's llvm variant."""
 
-from .command import exit_code, program_for
-from .peer_environment import mitsuba_parser, under_mitsuba
+from .mitsuba_environment import add_python_option, under_mitsuba
 
 
-def main():
-    parser = mitsuba_parser("bench/race", __doc__, busy="the page marks the run")
+def options(parser):
+    add_python_option(parser)
     parser.add_argument(
         "--backends",
         nargs="+",
@@ -54,11 +53,12 @@ def main():
     )
     parser.add_argument("--name", default="race", help="of the page in --results (race)")
     parser.add_argument("--scenes", nargs="*", help="only these, by name without .yaml")
-    arguments = parser.parse_args()
 
-    def measure():
-        under_mitsuba("race", arguments.python)
-        from . import race  # Needs what only the right Python has.
-        return race.measure(program_for(arguments), arguments)
 
-    return exit_code("bench/race", arguments, measure)
+def prepare(arguments):
+    under_mitsuba(arguments)
+
+
+def measure(program, arguments):
+    from . import race  # Needs what only the right Python has.
+    return race.measure(program, arguments)

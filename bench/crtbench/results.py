@@ -1,5 +1,5 @@
-"""What a measurement leaves behind: NAME.md for people, NAME.json for programs, both saying on what and
-with what it was measured."""
+"""What a measurement leaves behind: all of it in out/bench (NAME.md for people, NAME.json for programs, both
+with the machine and the build), and what crt claims by it in its section of a page in docs/results."""
 
 import datetime
 import json
@@ -12,7 +12,9 @@ import subprocess
 import sys
 import textwrap
 
-COLUMNS = 109
+from . import section
+from .command import REPOSITORY
+
 JSON_TEXT_COLUMNS = 80  # A key and its indent stand before it.
 
 
@@ -20,11 +22,12 @@ class Results:
     """Collects a page; nothing is written before write(), so that a measurement that breaks off leaves no
     half of a page."""
 
-    tool = "bench/run"
+    machine = None   # In words, where rows were measured on other machines.
 
     def __init__(self, program, arguments, name, title):
         self.program, self.arguments, self.name = program, arguments, name
         self.lines = [f"# {title}", ""]
+        self.claims = {}
         self.data = {}
         self.commands = []
         self.shown = {}   # Arguments of the command line that the page shows in other words.
@@ -32,14 +35,17 @@ class Results:
         self.started = datetime.datetime.now(datetime.timezone.utc)
 
     def paragraph(self, text):
-        self.lines += [*textwrap.wrap(text, COLUMNS, break_long_words=False, break_on_hyphens=False), ""]
+        self.lines += [*section.wrapped(text), ""]
 
     def heading(self, text):
         self.lines += [f"## {text}", ""]
 
     def table(self, head, rows):
-        self.lines += ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
-        self.lines += ["| " + " | ".join(str(cell) for cell in row) + " |" for row in rows] + [""]
+        self.lines += [*section.table(head, rows), ""]
+
+    def claim(self, title, text, head, rows, name=None):
+        """A section of docs/results: `name` where it is not that of the measurement."""
+        self.claims[name or self.name] = (title, text, head, rows)
 
     def not_measured(self, absent):
         """`absent`: {backend: why}."""
@@ -50,20 +56,15 @@ class Results:
         """A crt command line that stands for those that were run."""
         self.commands.append(self.program.plain(text))
 
-    def write(self):
+    def command_line(self):
+        """As it was typed, without the names of folders of this machine."""
+        words = [self.shown.get(a) or self.program.plain(a) for a in sys.argv[1:]]
+        return "bench/run " + shlex.join(words)
+
+    def write(self, whole_page=False):
+        """`whole_page`: docs/results/NAME.md is this page, and not only sections."""
         facts = provenance(self.program)
-        facts["command"] = (
-            self.tool
-            + " "
-            + shlex.join(
-                (
-                    self.shown.get(a) or self.program.plain(a)
-                    if not a.startswith(str(self.arguments.results))
-                    else "RESULTS"
-                )
-                for a in sys.argv[1:]
-            )
-        )
+        facts["command"] = self.command_line()
         facts["date"] = self.started.strftime("%Y-%m-%d %H:%M UTC")
         facts["load_at_start"] = self.load
         facts["timed_runs"] = self.program.timed
@@ -107,14 +108,32 @@ class Results:
                 "",
             ]
 
-        folder = self.arguments.results
+        # Results that were asked for in another folder, or are of a trial, change no page of docs/results.
+        apart = self.arguments.results
+        folder = apart or REPOSITORY / "out" / "bench"
         folder.mkdir(parents=True, exist_ok=True)
-        page = folder / f"{self.name}.md"
+        page = (apart or section.PAGES if whole_page else folder) / f"{self.name}.md"
         page.write_text("\n".join(self.lines).rstrip() + "\n")
         (folder / f"{self.name}.json").write_text(
             json.dumps(folded({"measured": facts, **self.data}), indent=1, ensure_ascii=False) + "\n"
         )
-        print(f"wrote {page} and {self.name}.json")
+        print(f"wrote {page} and {folder / self.name}.json")
+        if not apart:
+            self.write_sections(facts)
+
+    def write_sections(self, facts):
+        with_what = "; ".join(filter(None, [
+            self.machine or processor(), None if self.machine else facts["gpu"]]))
+        line = section.source(facts["command"], facts["commit"][:10] + ("+" if facts["dirty"] else ""),
+                              facts["date"].split()[0], with_what)
+        for name, claim in self.claims.items():
+            page = section.page_of(name)
+            if page is None:
+                print(f"no page of docs/results has the section '{name}'")
+                continue
+            title, text, head, rows = claim
+            section.replace(page, name, section.section(title, line, text, head, rows))
+            print(f"wrote the section '{name}' of {page}")
 
 
 def folded(value):

@@ -65,10 +65,9 @@ def measure(program, arguments):
 
     results.heading("What each gets wrong")
     results.paragraph(
-        "Rays of the sweeps of [stability-misses](stability-misses.md), "
-        "[stability-offset-safety](stability-offset-safety.md) and [stability-offset-tightness]"
-        "(stability-offset-tightness.md): how many slip through a closed mesh, meet the triangle that they "
-        "leave, or step over a layer."
+        "Rays of three sweeps of `bench/run stability`: how many slip through a closed mesh, meet the "
+        "triangle "
+        "that they leave, or step over a layer."
     )
     for sweep, rays in (("misses", 2e4), ("offset-safety", 4e4), ("offset-tightness", 4e3)):
         points = {
@@ -76,13 +75,44 @@ def measure(program, arguments):
             for name, environment in environments.items()
         }
         data["wrong"][sweep] = points
-        stability.TABLES[sweep](results, {ALTERNATIVES.get(name, name): p for name, p in points.items()})
+        text, head, rows = stability.TABLES[sweep]({ALTERNATIVES.get(n, n): p for n, p in points.items()})
+        results.paragraph(text)
+        results.table(head, rows)
+    results.claim(
+        "What the watertight test and exact offsets cost and gain",
+        f"OpenCL, {size} × {size} pixels, median of {runs} interleaved runs; the tree is the same. The "
+        f"sweeps "
+        "of [limits](limits.md) give the other columns: rays through vertices and edges of a closed sheet, "
+        "rays "
+        "that meet the triangle that they leave, and the smallest gap between two layers of a scene 100 "
+        "times "
+        "their size at which no ray skips the second.",
+        ["triangle test and offset", *(f"time, `{scene}`" for scene in SCENES), "through vertices and edges",
+         "own triangle met", "smallest gap : size"],
+        [summary(name, data) for name in environments],
+    )
     results.command(
         "CRT_KERNEL_DIR=SCRATCH/moeller_trumbore/core/kernel crt render configs/cornell_dragon.yaml "
         "--backend opencl --spp 8 -o unseen.pfm"
     )
     results.data = data
     results.write()
+
+
+def summary(name, data):
+    """One row of the claim: relative times, rates of wrong rays, the smallest gap that is right."""
+    def rate(points):
+        return f"{sum(p['failures'] for p in points) / sum(p['rays'] for p in points):.2g}"
+
+    wrong = {sweep: points[name] for sweep, points in data["wrong"].items()}
+    times = [
+        f"{1 / data['ratio'][scene][name]['median']:.2f}" if name in ALTERNATIVES else "1"
+        for scene in SCENES
+    ]
+    gaps = [p["gap"] for p in wrong["offset-tightness"] if p["extent"] == 100 and p["failures"] == 0]
+    return [ALTERNATIVES.get(name, "crt"), *times,
+            rate([p for p in wrong["misses"] if p["aim"] != "faces"]), rate(wrong["offset-safety"]),
+            f"{min(gaps):g}" if gaps else "–"]
 
 
 def kernels(program):

@@ -367,6 +367,21 @@ def measure(program, arguments):
         f"other "
         "rows compare one backend with itself."
     )
+    results.claim(
+        f"{equal} of {comparisons} renders have the bits of the reference",
+        f"{len(scenes)} scenes, {size} × {size} pixels, all channels and AOVs. Each row compares "
+        f"renders with the reference: two backends (`a : b`), or one backend with itself.",
+        ["what differs between the renders", "samples per pixel", "scenes", "pixels that differ"],
+        [
+            [
+                label,
+                by_scene[scenes[0]]["spp"],
+                len(by_scene),
+                sum(result["differing_pixels"] for result in by_scene.values()),
+            ]
+            for label, by_scene in table.items()
+        ],
+    )
     rows = []
     for label, by_scene in table.items():
         rows.append([label, by_scene[scenes[0]]["spp"], *(cell(by_scene[scene]) for scene in scenes)])

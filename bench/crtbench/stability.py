@@ -1,5 +1,5 @@
 """How far a backend's arithmetic carries: sweeps over sizes, gaps, places, fields of view and solid angles,
-each to where it ends. One page a sweep, stability-SWEEP.md, with every backend that runs here. Rays are
+each to where it ends, with every backend that runs here. Rays are
 counted, nothing is timed: it may run on a busy machine. --rows takes what stability_sweep printed on other
 machines, with "backend", and "machine" in words, added to each line, and the number of rays asked for as
 "asked".
@@ -12,13 +12,13 @@ from .program import Failure
 from .results import Results, processor
 
 SWEEPS = {
-    "misses": "Rays at vertices, edges and faces",
-    "offset-safety": "Offsets: how often a ray meets the triangle that it leaves",
-    "offset-tightness": "Offsets: how near a layer may be and still be seen",
-    "far": "Far from the origin",
-    "scale": "Scale",
-    "fov": "Field of view",
-    "solid-angle": "Solid angle of a light",
+    "misses": "Rays do not pass between triangles",
+    "offset-safety": "Rays do not meet the triangle that they leave",
+    "offset-tightness": "How near a layer may be and still be seen",
+    "far": "Scenes far from the origin",
+    "scale": "Huge and tiny scenes",
+    "fov": "Narrow and wide fields of view",
+    "solid-angle": "Small lights",
 }
 # Of each point of a sweep; `--times` multiplies them. Offset safety has 20 points.
 RAYS = {
@@ -31,6 +31,15 @@ RAYS = {
     "solid-angle": 3e6,
 }
 BACKENDS = ["cuda", "embree", "opencl"]
+
+
+def options(parser):
+    parser.add_argument("--scenes", nargs="*", metavar="SWEEP", help=f"only these of {', '.join(SWEEPS)}")
+    parser.add_argument("--rows", help="measurements made on another machine, JSON Lines")
+    parser.add_argument(
+        "--times", type=float, default=1, metavar="N",
+        help="so many times the rays of each point (1); 5 makes 1e8 of offset-safety",
+    )
 
 
 def measure(program, arguments):
@@ -53,12 +62,15 @@ def measure(program, arguments):
             if backend in given or backend in usable
         }
         results = Results(program, arguments, f"stability-{sweep}", SWEEPS[sweep])
-        TABLES[sweep](results, points)
+        text, head, rows = TABLES[sweep](points)
+        results.paragraph(text)
+        results.table(head, rows)
         results.not_measured(
             {backend: reason for backend, reason in absent.items() if backend not in points}
         )
         if given:
-            results.paragraph(f"{amounts(points)} {origins(points)}")
+            results.machine = origins(points).rstrip(".")
+        results.claim(SWEEPS[sweep], f"{text} {amounts(points)}", head, merged(rows))
         for backend, rows in points.items():
             asked = f"{rows[0]['asked']:.0e}" if "asked" in rows[0] else "RAYS"
             results.command(f"{program.build}/bin/stability_sweep {backend} {sweep} {asked}")
@@ -113,15 +125,14 @@ def amounts(points):
 
 def origins(points):
     parts = []
-    # This machine comes last, as "the one below": the page's table of what it was measured with describes
-    # it.
+    # This machine comes last.
     for machine, backends in sorted(
         alike(points, lambda rows: rows[0].get("machine", "another machine")).items(),
         key=lambda item: item[0] == processor(),
     ):
         verb = "" if parts else " was measured" if len(backends) == 1 else " were measured"
         parts.append(
-            f"{together(backends)}{verb} on {'the one below' if machine == processor() else machine}"
+            f"{together(backends)}{verb} on {machine}"
         )
     return "; ".join(parts) + "."
 
@@ -135,8 +146,8 @@ def count(point):
     return f"{point['failures']} of {point['rays']:.3g} ({point['failures'] / point['rays']:.2g})"
 
 
-def by_point(results, points, keys, heads, cell):
-    """A row a point, a column a backend."""
+def by_point(points, keys, heads, cell):
+    """(head, rows): a row a point, a column a backend."""
     backends = list(points)
     rows = []
     for same in zip(*points.values()):
@@ -146,39 +157,54 @@ def by_point(results, points, keys, heads, cell):
                 *(cell(p) for p in same),
             ]
         )
-    results.table([*heads, *backends], rows)
+    return [*heads, *backends], rows
 
 
-def misses(results, points):
-    results.paragraph(
+def misses(points):
+    text = (
         "A crumpled sheet covers the whole film, a vertex or an edge on every pixel's first ray: by "
         "continuity no ray can pass it. Failures are rays that do. "
         "Faces are aimed at by further, random samples of the same pixels."
     )
-    by_point(results, points, ("place", "aim"), ("place", "rays at"), count)
+    return text, *by_point(points, ("place", "aim"), ("place", "rays at"), count)
 
 
-def offset_safety(results, points):
-    results.paragraph(
+def offset_safety(points):
+    text = (
         "One triangle in a random place and pose, of random shape, in a scene that is 1 to 10⁶ times as "
         "large, so that its coordinates become coarse; rays scatter off it "
         "by the cosine. Failures meet the triangle that they have just left. Lengths in the author's units."
     )
-    by_point(results, points, ("size", "extent"), ("triangle's size", "scene's half extent : size"), count)
-    for backend, all_points in points.items():
-        rays, failures = (sum(p[k] for p in all_points) for k in ("rays", "failures"))
-        results.paragraph(f"`{backend}`, all together: {failures} of {rays:.3g}.")
+    heads = ("triangle's size", "scene's half extent : size")
+    return text, *by_point(points, ("size", "extent"), heads, count)
 
 
-def offset_tightness(results, points):
-    results.paragraph(
+def offset_tightness(points):
+    text = (
         "Two parallel squares of edge 1 and 2 in a random place and pose, `gap` apart, in a scene whose "
         "half "
         "extent is 1 (1.5 for the first rows) to 10⁴; rays pass through the first, "
         "whose index is 1. Failures do not meet the second. The last gap with hardly any failure is the "
         "limit that the manual gives."
     )
-    by_point(results, points, ("extent", "gap"), ("scene's half extent : size", "gap : size"), count)
+    return text, *by_point(points, ("extent", "gap"), ("scene's half extent : size", "gap : size"), count)
+
+
+def merged(rows):
+    """Neighbours that differ in one column alone, that in which the first two rows differ, become one row,
+    `first … last`."""
+    column = next((i for i, cell in enumerate(rows[0]) if cell != rows[1][i]), 0) if len(rows) > 1 else 0
+    groups = []
+    for row in rows:
+        others = row[:column] + row[column + 1:]
+        if groups and groups[-1][0] == others:
+            groups[-1][1].append(row)
+        else:
+            groups.append((others, [row]))
+    for _, same in groups:
+        if len(same) > 1:
+            same[0][column] = f"{same[0][column]} … {same[-1][column]}"
+    return [same[0] for _, same in groups]
 
 
 def relation(point):
@@ -188,8 +214,8 @@ def relation(point):
     return f"{same}; mean {point['mean']:+.2g}"
 
 
-def far(results, points):
-    results.paragraph(
+def far(points):
+    text = (
         "A lit room moved along (1, 0.7, −0.3) by many times its size: once with vertices that the sum in "
         "double holds exactly, once a third of it, which rounds. "
         "Against the same room at the origin, with the same random numbers: pixels that differ in any bit, "
@@ -198,37 +224,36 @@ def far(results, points):
     for same in points.values():
         for p in same:
             p["how"] = "exactly" if p["representable"] else "rounded"
-    by_point(results, points, ("sizes", "how"), ("moved by … sizes", "shift"), relation)
+    return text, *by_point(points, ("sizes", "how"), ("moved by … sizes", "shift"), relation)
 
 
-def scale(results, points):
-    results.paragraph(
+def scale(points):
+    text = (
         "A lit room times 2^m and 10^m, against itself: pixels that differ in any bit, and the relative "
         "difference of the mean, with the same random numbers."
     )
     for same in points.values():
         for p in same:
             p["factor"] = f"{p['base']}^{p['exponent']}"
-    by_point(results, points, ("factor",), ("times",), relation)
+    return text, *by_point(points, ("factor",), ("times",), relation)
 
 
-def fov(results, points):
-    results.paragraph(
+def fov(points):
+    text = (
         "Stripes two pixels wide where the film's columns are, 128 × 128 pixels, the view along (1, "
         "1, 1). Failures are rays that see the stripe of another column: what the rounding "
         "of directions to float costs, in rays."
     )
-    by_point(results, points, ("degrees",), ("field of view, degrees",), count)
+    return text, *by_point(points, ("degrees",), ("field of view, degrees",), count)
 
 
-def solid_angle(results, points):
-    results.paragraph(
+def solid_angle(points):
+    text = (
         "A square light at height 1 over a floor, from 2 rad across to nothing: the irradiance below its "
         "centre against the closed form (Howell, B-4). Relative error, and its standard error "
         "from 16 seeds."
     )
-    by_point(
-        results,
+    return text, *by_point(
         points,
         ("half_edge", "solid_angle"),
         ("half edge", "solid angle, sr"),

@@ -34,7 +34,7 @@ std::string kernelText(const std::string& wavefront_text);
 
 /// How many blocks a multiprocessor should hold at once, in the order of trying: more hide latency better,
 /// but leave each thread fewer registers. The first that spills at most kSpillBytesAllowed wins; the last is
-/// not judged. A few spilled values cost less than a fourth block gains (docs/results/cuda.md); a fifth
+/// not judged. A few spilled values cost less than a fourth block gains (docs/results/speed.md); a fifth
 /// gains where there is no tree to traverse (docs/decisions/0041-instruction-cache.md); a kernel that only
 /// traces is best with seven (docs/decisions/0042-wavefront.md).
 std::vector<int> blocksPerMultiprocessor(const KernelSpec& spec);

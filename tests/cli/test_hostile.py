@@ -3,17 +3,18 @@
 demand: an exit code of the documented ones and the right one, a message that says why, no crash, no hang, no
 memory that the input does not account for, and every file that was there still there.
 
-    test_hostile.py CRT FAKE_PLUGIN_DIR [--write docs/results/hostile.md] [--only TEXT] [--slower FACTOR]
+    test_hostile.py CRT FAKE_PLUGIN_DIR [--write docs/results/robustness.md] [--only TEXT] [--slower FACTOR]
 
 The inputs are made here. Python's standard library only.
 
-Over 450 lines: one list of inputs, which docs/results/hostile.md shows in the same order.
+Over 450 lines: one list of inputs.
 """
 
 import argparse
 import concurrent.futures
 import hashlib
 import os
+import pathlib
 import resource
 import shutil
 import signal
@@ -31,6 +32,10 @@ import harness
 import hostile_models
 import hostile_values
 import hostile_work
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "bench"))
+sys.dont_write_bytecode = True
+from crtbench import section  # noqa: E402
 
 SECONDS = 10            # Of processor time; longer is a hang.
 WAIT_SECONDS = 600      # In all: waiting for a pipe takes no processor time. Only ends hangs.
@@ -1993,31 +1998,33 @@ def sentence(result):
     return text if len(text) <= 160 else text[:159] + "…"
 
 
-def markdown(results):
+def summary(results):
+    """The section of a page: a row for each kind of input."""
     faults = sum(r["case"].group == "fault" for r in results)
-    lines = [
-        "# Hostile inputs and faults",
-        "",
-        "Written by `tests/cli/test_hostile.py --write`, which makes every input, runs crt on it, and is "
-        "part of `scripts/test`.",
-        "",
-        f"{len(results) - faults} inputs and {faults} faults. Demanded of each: the exit code of the table, "
-        f"no crash, no hang (10 s of processor time), less than 2 GB of memory, every file that was "
-        "there unchanged, no temporary file left.",
-        "",
-    ]
+    rows = []
     for group in dict.fromkeys(r["case"].group for r in results):
-        lines += [f"## {group.capitalize()}", "", "| # | asked | exit code | said |", "|---|---|---|---|"]
-        for number, r in enumerate(results, 1):
-            if r["case"].group == group:
-                asked = (
-                    r["case"].asked.replace("|", "\\|").encode("ascii", "backslashreplace").decode()
-                    if "\x1b" in r["case"].asked
-                    else r["case"].asked.replace("|", "\\|")
-                )
-                lines.append(f"| {number} | {asked} | {r['code']} | {sentence(r)} |")
-        lines.append("")
-    return "\n".join(lines)
+        of_group = [r for r in results if r["case"].group == group]
+        codes = sorted(dict.fromkeys(r["code"] for r in of_group))
+        said = next((r for r in of_group if r["code"] and "\x1b" not in r["case"].asked), of_group[0])
+        rows.append([
+            group,
+            len(of_group),
+            ", ".join(f"{code}: {sum(r['code'] == code for r in of_group)}" for code in codes),
+            said["case"].asked.replace("|", "\\|"),
+            sentence(said),
+        ])
+    return section.section(
+        f"{len(results) - faults} hostile inputs and {faults} faults end with the right exit code",
+        section.source("tests/cli/test_hostile.py CRT FAKE_PLUGIN_DIR --write PAGE", section.commit(),
+                       section.today(), f"{os.cpu_count()} processors"),
+        "The test makes every input, and demands of each run the exit code of its list, no crash, no hang "
+        "(10 s of "
+        "processor time), less than 2 GB of memory, every existing file unchanged, and no temporary file "
+        "left. It is "
+        "part of `scripts/test`. [Exit codes](../architecture.md#exit-codes) says what the codes mean.",
+        ["kind", "cases", "exit code: cases", "for example", "crt says"],
+        rows,
+    )
 
 
 def main():
@@ -2025,7 +2032,7 @@ def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("crt")
     parser.add_argument("fake")
-    parser.add_argument("--write")
+    parser.add_argument("--write", metavar="PAGE", help="whose section 'hostile' shall be replaced")
     parser.add_argument("--only", default="")
     parser.add_argument("--slower", type=float, default=1)
     options = parser.parse_args()
@@ -2077,8 +2084,7 @@ def main():
         f"({slowest['case'].asked}), largest {largest['memory'] / 1e6:.0f} MB ({largest['case'].asked})"
     )
     if options.write and not failed:
-        with open(options.write, "w", encoding="utf-8") as file:
-            file.write(markdown(results))
+        section.replace(pathlib.Path(options.write), "hostile", summary(results))
     return 1 if failed else 0
 
 

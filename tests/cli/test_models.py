@@ -193,7 +193,7 @@ class Meshes(CliTest):
 
 class CornellBox(CliTest):
     """The reference is what Mitsuba 3 gave in wavelengths when bench/run mtl-agreement was last run
-    (docs/results/mtl-agreement.json)."""
+    (docs/results/files.md)."""
 
     SIZE = 128
 

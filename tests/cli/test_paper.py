@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""bench/paper makes its page of rows that were measured elsewhere: nothing is timed here."""
+"""bench/run paper makes its page of rows that were measured elsewhere: nothing is timed here."""
 
 import importlib.util
 import json
@@ -44,7 +44,7 @@ class Page(unittest.TestCase):
         file = self.folder / name
         file.write_text(rows if isinstance(rows, str) else "".join(json.dumps(r) + "\n" for r in rows))
         run = subprocess.run(
-            [sys.executable, ROOT / "bench" / "paper", "--no-build", "--build", BUILD, "--rows", file,
+            [sys.executable, ROOT / "bench" / "run", "paper", "--no-build", "--build", BUILD, "--rows", file,
              "--results", self.folder / "results"],
             capture_output=True, text=True, env={**os.environ, "LC_ALL": "C.UTF-8", **dict(environment)})
         self.assertEqual(run.returncode, code, run.stderr)
@@ -64,7 +64,7 @@ class Page(unittest.TestCase):
         absent = {"part": "absent", "of": "table1", "what": "paper_gpu", "reason": "no GPU"}
         page = self.make([MACHINE, absent])
         self.assertIn("Not measured: table1, `paper_gpu`: no GPU. The command, where it can run: "
-                      "`bench/paper --parts table1`.", page)
+                      "`bench/run paper --parts table1`.", page)
         self.assertIn("Not measured: figure3", page)
         # Another machine's rows have it.
         there = {"part": "run", "of": "table1", "what": "paper_gpu", "complete": True, "others": 0}

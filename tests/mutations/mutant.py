@@ -6,7 +6,7 @@ should find it ("verify NAME": that case of `crt verify`; "unit NAME": that unit
     Breaks: Light that falls on a surface at a slant counts in full.
     Killed-by: verify square-light
 
-    In: core/kernel/shade.h crt_sample_light
+    In: core/kernel/transport/direct_light.h crt_sample_lights
     - crt_surface_eval(bsdf, offer.wi)
     + crt_surface_eval(bsdf, offer.wi) / dot3(offer.wi, bsdf->ns)
 

@@ -8,7 +8,7 @@
 /// Where intervals come from. Rows of one replicate are looks at one progressive render, so only replicates
 /// are independent, and so are the folds of a reference. Every interval is the jackknife over both
 /// (jackknife.h): leave one out, repeat the whole fit. Positive quantities are treated as logarithms. For
-/// means it is Student's interval exactly; for the rest unit_fits.cpp and docs/results/false-alarms.md
+/// means it is Student's interval exactly; for the rest unit_fits.cpp and docs/results/accuracy.md
 /// measure the coverage.
 ///
 /// Configurations that render the same bits share the errors of whichever has more of them; times are their

@@ -1,9 +1,7 @@
-"""What bench/peers and bench/agree need beside crt: a Python with mitsuba, numpy and PyYAML, for the chart
-of bench/peers with matplotlib too, and an LLVM that Mitsuba's compiler accepts. Both are put into out/ when
-they are missing; nothing of them is ever part of the product. The measurement then runs under that
-Python."""
+"""What the comparisons with Mitsuba 3 need beside crt: a Python with mitsuba, numpy and PyYAML, and an LLVM
+that Mitsuba's compiler accepts. Both are put into out/ when they are missing; nothing of them is ever part
+of the product. The measurement then runs under that Python."""
 
-import argparse
 import os
 import pathlib
 import re
@@ -11,10 +9,10 @@ import subprocess
 import sys
 import venv
 
-from .command import REPOSITORY, add_options, exit_code, program_for
+from .command import REPOSITORY
 from .program import Failure
 
-PACKAGES = ["mitsuba==3.9.1", "numpy", "pyyaml", "matplotlib"]
+PACKAGES = ["mitsuba==3.9.1", "numpy", "pyyaml"]
 OLDEST_LLVM = (
     17  # Older ones cannot select the instruction `fminimum` on x86, which Mitsuba's kernels contain.
 )
@@ -88,55 +86,19 @@ def llvm_library():
     return newest()
 
 
-def mitsuba_parser(prog, description, busy):
-    """Of a bench command that runs under a Python with mitsuba; `busy` as in add_options()."""
-    parser = argparse.ArgumentParser(
-        prog=prog, description=description, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    add_options(parser, busy=busy)
+def add_python_option(parser):
     parser.add_argument(
         "--python",
         help="a Python that has mitsuba, numpy and yaml; otherwise this one, or one that is made in "
              "out/peers-venv",
     )
-    return parser
 
 
-def main():
-    parser = mitsuba_parser("bench/peers", __doc__, busy="a wall time is marked")
-    parser.add_argument(
-        "--seconds",
-        type=float,
-        default=600,
-        help="about how long all of it may take, without making environments (600)",
-    )
-    parser.add_argument(
-        "--replicates",
-        type=int,
-        default=8,
-        help="renders with seeds of their own for each number of samples (8)",
-    )
-    parser.add_argument(
-        "--samplers",
-        nargs="+",
-        default=["independent", "stratified", "multijitter", "orthogonal", "ldsampler"],
-        help="Mitsuba's samplers of which the best is taken (all five)",
-    )
-    arguments = parser.parse_args()
-    return exit_code("bench/peers", arguments, lambda: measure(arguments))
-
-
-def under_mitsuba(tool, wanted):
-    """Starts bench/TOOL anew under a Python that has mitsuba, unless this one is it."""
+def under_mitsuba(arguments):
+    """Starts bench/run anew under a Python that has mitsuba, unless this one is it."""
     os.environ["DRJIT_LIBLLVM_PATH"] = llvm_library()
     if READY not in os.environ:
-        python = python_with_mitsuba(wanted)
+        python = python_with_mitsuba(arguments.python)
         os.execve(
-            python, [python, str(REPOSITORY / "bench" / tool), *sys.argv[1:]], {**os.environ, READY: "1"}
+            python, [python, str(REPOSITORY / "bench" / "run"), *sys.argv[1:]], {**os.environ, READY: "1"}
         )
-
-
-def measure(arguments):
-    under_mitsuba("peers", arguments.python)
-    from . import peers  # Needs what only the right Python has.
-    return peers.measure(program_for(arguments), arguments)

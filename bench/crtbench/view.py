@@ -1,14 +1,12 @@
-#!/usr/bin/env python3
 """How fluent `crt view` is: the time from its start to the first picture and to the first whole one;
 pictures a second while the image converges, and while a hand turns the camera.
 
-    bench/view                                    the Cornell box at 1280 x 720 by the best backend
-    bench/view --backend embree --threads 2 --seconds 20 configs/cornell_dragon.yaml
+    bench/run view                                  the Cornell box at 1280 x 720 by the best backend
+    bench/run view --backend embree --threads 2 --seconds 20 configs/cornell_dragon.yaml
 
 Pictures are fetched as a page fetches them, one after another; no browser takes part.
 """
 
-import argparse
 import json
 import os
 import pathlib
@@ -19,7 +17,7 @@ import time
 import urllib.parse
 import urllib.request
 
-ROOT = pathlib.Path(__file__).resolve().parents[1]
+ROOT = pathlib.Path(__file__).resolve().parents[2]
 
 
 class View:
@@ -84,10 +82,7 @@ def turn(view, seconds):
         time.sleep(max(0, 1 / 60 - (time.monotonic() - before)))
 
 
-def main():
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+def options(parser):
     parser.add_argument("scene", nargs="?", default=str(ROOT / "configs" / "cornell_box.yaml"))
     parser.add_argument("--crt", default=str(ROOT / "build" / "release" / "bin" / "crt"))
     parser.add_argument("--size", default="1280x720")
@@ -95,8 +90,9 @@ def main():
     parser.add_argument("--device")
     parser.add_argument("--threads")
     parser.add_argument("--seconds", type=float, default=10, help="of each of the two counts (10)")
-    arguments = parser.parse_args()
 
+
+def alone(arguments):
     view = View(arguments)
     try:
         print(f"address printed after {time.monotonic() - view.started:.2f} s")
@@ -120,7 +116,3 @@ def main():
         view.process.terminate()
         view.process.wait()
     print(f"{os.cpu_count()} processors, load {os.getloadavg()[0]:.1f}")
-
-
-if __name__ == "__main__":
-    main()

@@ -1,4 +1,4 @@
-"""Paths a second and time to an error on one GPU, in crt and in Mitsuba 3, scene by scene in one run."""
+"""Paths a second and time to an error in crt and in Mitsuba 3, scene by scene in one run."""
 
 import dataclasses
 import math
@@ -12,7 +12,7 @@ from .agree import write_normals, write_picture, write_sky
 from .program import Failure, Spread
 from .results import Results
 
-FOLDERS = ["bench/scenes/gpu_peers", "bench/scenes/race"]
+FOLDERS = ["bench/scenes/mitsuba_speed", "bench/scenes/race"]
 SEED = 5_000_000   # Of the timed renders.
 
 
@@ -78,7 +78,7 @@ def best(found, whose):
 
 
 def seconds_to_error(program, file, arguments):
-    """{contestant: (points, seconds to the target or None)}, as bench/race has it."""
+    """{contestant: (points, seconds to the target or None)}, as `race` has it."""
     racing = contestants(
         program, file, arguments.backend, arguments.variant, arguments.samplers, arguments.error_size
     )
@@ -131,8 +131,7 @@ def measure(program, arguments):
         arguments.error_size, arguments.renders, arguments.target = 16, 2, 0.2
         arguments.reference_samples = 64
     write_inputs(program.scratch)
-    results = Results(program, arguments, "gpu-peers", "crt and Mitsuba 3 on one GPU")
-    results.tool = "bench/gpu_peers"
+    results = Results(program, arguments, f"mitsuba-speed-{arguments.backend}", "Speed of crt and Mitsuba 3")
     begin, rows, results.data = time.monotonic(), [], {}
     for file in files_of(program, arguments.scenes):
         if rows and time.monotonic() - begin > arguments.seconds:
@@ -166,6 +165,23 @@ def measure(program, arguments):
     to = f"to {arguments.target:g}, s:"
     results.table(
         ["scene", "Mpaths/s: crt", "Mitsuba", "ratio", f"{to} crt", f"{to} Mitsuba", "ratio"], rows
+    )
+    text = (
+        f"Scenes translated for Mitsuba {mi.__version__} (`{arguments.variant}`), no roulette; crt with one "
+        f"sequence of Sobol points, Mitsuba with {', '.join(arguments.samplers)}. Rates: "
+        f"{arguments.size} × {arguments.size} pixels, {arguments.samples} samples, rendering alone, median "
+        f"of "
+        f"{arguments.runs} interleaved runs. Time: until the RMSE of luminance at {arguments.error_size} × "
+        f"{arguments.error_size} pixels is {arguments.target:.0%} of the mean, each program against its own "
+        "converged image."
+    )
+    where = "one GPU" if arguments.backend == "cuda" else "a processor"
+    results.claim(
+        f"Speed beside Mitsuba 3 on {where}",
+        text,
+        ["scene", "crt, million paths/s", "Mitsuba", "crt : Mitsuba", f"crt, s to {arguments.target:.0%}",
+         "Mitsuba, s", "Mitsuba : crt"],
+        rows,
     )
     results.write()
     return 0

@@ -1,14 +1,12 @@
-#!/usr/bin/env python3
 """Many lamps under a ceiling: what the tree of lights costs and gains (docs/decisions/0026).
 
-    bench/lamps NAME=CRT... [--lamps 1000] [--place room] [--rounds 5] [--samples 64] [--backend embree]
+    bench/run lamps NAME=CRT... [--lamps 1000] [--place room] [--rounds 5] [--samples 64] [--backend embree]
 
 Renders, with each of the programs given and in turn, a room (6 x 6 x 2.5) or a hall (24 x 24 x 2.5)
 under a grid of lamps that have the power of one together, and the same triangles with one lamp alone.
 Prints the error that the render states, the processor seconds of its sampling (one thread), and error
 times the square root of seconds: of two programs' the quotient is the gain at equal time.
 """
-import argparse
 import json
 import math
 import pathlib
@@ -80,16 +78,16 @@ def sampling(crt, place, lamps, alone, samples, backend, folder):
     return error, (seconds[samples] - seconds[1]) * samples / (samples - 1)
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+def options(parser):
     parser.add_argument("programs", nargs="+", metavar="NAME=CRT")
     parser.add_argument("--lamps", type=int, default=1000)
     parser.add_argument("--place", choices=("room", "hall"), default="room")
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--samples", type=int, default=64)
     parser.add_argument("--backend", default="embree")
-    asked = parser.parse_args()
+
+
+def alone(asked):
     programs = dict(p.split("=", 1) for p in asked.programs)
     runs = {(p, what): [] for p in programs for what in ("all", "one")}
     with tempfile.TemporaryDirectory() as name:
@@ -113,7 +111,3 @@ def main():
     for program in programs:
         ratio = product[program, "all"] / product[program, "one"]
         print(f"  {program:10} all over one, error at equal time: {ratio:.2f}")
-
-
-if __name__ == "__main__":
-    main()

@@ -1,15 +1,14 @@
-"""How fast are crt and Mitsuba 3 on one GPU? The shipped Cornell boxes, a ball under a sky and the scenes
-of bench/race are rendered by both in one run: paths a second on a large image, and seconds until the error
+"""How fast are crt and Mitsuba 3? The shipped Cornell boxes, a ball under a sky and the scenes
+of `race` are rendered by both in one run: paths a second on a large image, and seconds until the error
 of an image is 1 %. Times are those of rendering alone: scenes are loaded and kernels compiled before.
 
 Needs a Python with mitsuba, numpy and PyYAML (--python)."""
 
-from .command import exit_code, program_for
-from .peer_environment import mitsuba_parser, under_mitsuba
+from .mitsuba_environment import add_python_option, under_mitsuba
 
 
-def main():
-    parser = mitsuba_parser("bench/gpu_peers", __doc__, busy="nothing happens")
+def options(parser):
+    add_python_option(parser)
     parser.add_argument("--backend", default="cuda", help="of crt (cuda)")
     parser.add_argument(
         "--variant", default="cuda_ad_spectral", help="of Mitsuba, a spectral one (cuda_ad_spectral)"
@@ -31,11 +30,12 @@ def main():
         "--seconds", type=float, default=1e9, help="after which no further scene is begun (no limit)"
     )
     parser.add_argument("--scenes", nargs="*", help="only these, by name without .yaml")
-    arguments = parser.parse_args()
 
-    def measure():
-        under_mitsuba("gpu_peers", arguments.python)
-        from . import gpu_peers  # Needs what only the right Python has.
-        return gpu_peers.measure(program_for(arguments), arguments)
 
-    return exit_code("bench/gpu_peers", arguments, measure)
+def prepare(arguments):
+    under_mitsuba(arguments)
+
+
+def measure(program, arguments):
+    from . import mitsuba_speed  # Needs what only the right Python has.
+    return mitsuba_speed.measure(program, arguments)
