@@ -1,5 +1,6 @@
 #include "compile/brightest_path.h"
 
+#include "kernel/geometry/slots.h"
 #include "kernel/materials/composition.h"
 #include "kernel/transport/direct_light.h"
 
