@@ -23,14 +23,14 @@ CRT_KERNEL_BEGIN
 #define CRT_WAVE_LAST 16u /* behind the surface that its shadow ray meets there is no other */
 
 /* Rows of a slot: what it waits for, then the state of its path. */
-#define CRT_ROW_OF_STATE(ROW, WHEN, DECLARATIONS, LANES) CRT_ROW_##ROW,
+#define CRT_ROW_NUMBER(ROW, DECLARATIONS, LANES) CRT_ROW_##ROW,
 enum CrtWaveRow {
     CRT_ROW_HIT,              /* t, b1, b2, slot of the scene */
     CRT_ROW_HIT_IDS,          /* primitive, instance, material of a mix */
     CRT_ROW_SHADOW_ORIGIN,    /* and reach */
     CRT_ROW_SHADOW_DIRECTION, /* and the media around it */
     CRT_ROW_SHADOW_RADIANCE,
-    CRT_PATH_STATE(CRT_ROW_OF_STATE)
+    CRT_PATH_STATE(CRT_ROW_NUMBER, CRT_ROW_NUMBER, CRT_ROW_NUMBER, CRT_ROW_NUMBER)
     /* Where there are panes: the origin of a path's ray behind what it has passed, or the first direction of
        a shadow ray; and how many surfaces it has passed. */
     CRT_ROW_PASSED
@@ -172,65 +172,48 @@ CRT_FN u32 crt_load_depth(const CrtWave *wave, u32 slot) {
 #define CRT_UNPACK_WORD crt_set_path_word(path, crt_bits(lane));
 #define CRT_UNPACK_NUMBERS path->sampler = crt_load_sampler(ctx, wave, slot);
 #define CRT_UNPACK_UNUSED
-#define CRT_STORE_ROW(ROW, LANES) *crt_row(wave, CRT_ROW_##ROW, slot) = CRT_PACK_##LANES;
-#define CRT_LOAD_ROW(ROW, LANES)                                 \
+#define CRT_STORE_ROW(ROW, DECLARATIONS, LANES) *crt_row(wave, CRT_ROW_##ROW, slot) = CRT_PACK_##LANES;
+#define CRT_STORE_IN_TREE(ROW, DECLARATIONS, LANES) \
+    if (crt_has_light_tree(ctx)) *crt_row(wave, CRT_ROW_##ROW, slot) = CRT_PACK_##LANES;
+#define CRT_LOAD_ROW(ROW, DECLARATIONS, LANES)                   \
     {                                                            \
         const vec4 row = *crt_row(wave, CRT_ROW_##ROW, slot);    \
         CRT_UNPACK_##LANES                                       \
     }
+#define CRT_LOAD_IN_TREE(ROW, DECLARATIONS, LANES)               \
+    if (crt_has_light_tree(ctx)) {                               \
+        const vec4 row = *crt_row(wave, CRT_ROW_##ROW, slot);    \
+        CRT_UNPACK_##LANES                                       \
+    }
+#define CRT_NO_ROW(ROW, DECLARATIONS, LANES)
 
-/* What crt_shade changes, but for the radiance. */
-#define CRT_STORE_VERTEX(ROW, WHEN, DECLARATIONS, LANES) CRT_STORE_VERTEX_##WHEN(ROW, LANES)
-#define CRT_STORE_VERTEX_VERTEX(ROW, LANES) CRT_STORE_ROW(ROW, LANES)
-#define CRT_STORE_VERTEX_TREE(ROW, LANES) if (crt_has_light_tree(ctx)) CRT_STORE_ROW(ROW, LANES)
-#define CRT_STORE_VERTEX_BEGIN(ROW, LANES)
-#define CRT_STORE_VERTEX_FIRST(ROW, LANES)
+/* The rows that crt_shade changes, but for the radiance. */
 CRT_FN void crt_store_vertex(const CrtContext *ctx, const CrtWave *wave, u32 slot, const CrtPath *path) {
-    CRT_PATH_STATE(CRT_STORE_VERTEX)
+    CRT_PATH_STATE(CRT_STORE_ROW, CRT_STORE_IN_TREE, CRT_NO_ROW, CRT_NO_ROW)
 }
 
-#define CRT_STORE_FIRST(ROW, WHEN, DECLARATIONS, LANES) CRT_STORE_FIRST_##WHEN(ROW, LANES)
-#define CRT_STORE_FIRST_VERTEX(ROW, LANES)
-#define CRT_STORE_FIRST_TREE(ROW, LANES)
-#define CRT_STORE_FIRST_BEGIN(ROW, LANES)
-#define CRT_STORE_FIRST_FIRST(ROW, LANES) CRT_STORE_ROW(ROW, LANES)
 CRT_FN void crt_store_first_hit(const CrtWave *wave, u32 slot, const CrtPath *path) {
-    CRT_PATH_STATE(CRT_STORE_FIRST)
+    CRT_PATH_STATE(CRT_NO_ROW, CRT_NO_ROW, CRT_NO_ROW, CRT_STORE_ROW)
 }
 
-/* Of a sample that begins: all rows. */
-#define CRT_STORE_BEGIN(ROW, WHEN, DECLARATIONS, LANES) CRT_STORE_BEGIN_##WHEN(ROW, LANES)
-#define CRT_STORE_BEGIN_VERTEX(ROW, LANES)
-#define CRT_STORE_BEGIN_TREE(ROW, LANES)
-#define CRT_STORE_BEGIN_BEGIN(ROW, LANES) CRT_STORE_ROW(ROW, LANES)
-#define CRT_STORE_BEGIN_FIRST(ROW, LANES)
+/* All rows of a sample that begins. */
 CRT_FN void crt_store_begin(const CrtContext *ctx, const CrtWave *wave, u32 slot, const CrtPath *path) {
     crt_store_vertex(ctx, wave, slot, path);
-    CRT_PATH_STATE(CRT_STORE_BEGIN)
+    CRT_PATH_STATE(CRT_NO_ROW, CRT_NO_ROW, CRT_STORE_ROW, CRT_NO_ROW)
     if (crt_wave_has_first_hit(ctx)) crt_store_first_hit(wave, slot, path);
 }
 
-/* Written in place, as crt_path_begin does. */
-#define CRT_LOAD_PATH(ROW, WHEN, DECLARATIONS, LANES) CRT_LOAD_PATH_##WHEN(ROW, LANES)
-#define CRT_LOAD_PATH_VERTEX(ROW, LANES) CRT_LOAD_ROW(ROW, LANES)
-#define CRT_LOAD_PATH_TREE(ROW, LANES) if (crt_has_light_tree(ctx)) CRT_LOAD_ROW(ROW, LANES)
-#define CRT_LOAD_PATH_BEGIN(ROW, LANES) CRT_LOAD_ROW(ROW, LANES)
-#define CRT_LOAD_PATH_FIRST(ROW, LANES) /* only what is added to the film needs it */
+/* All but the first hit, which only the film needs. Written in place, as crt_path_begin does. */
 CRT_FN void crt_load_path(const CrtContext *ctx, const CrtWave *wave, u32 slot, CrtPath *path) {
     f32 lane;
-    CRT_PATH_STATE(CRT_LOAD_PATH)
+    CRT_PATH_STATE(CRT_LOAD_ROW, CRT_LOAD_IN_TREE, CRT_LOAD_ROW, CRT_NO_ROW)
     path->ray.reach = CRT_INFINITY;
     path->met = CRT_HAS(MIX) ? crt_bits(V4Z(*crt_row(wave, CRT_ROW_HIT_IDS, slot))) : CRT_NONE;
 }
 
-#define CRT_LOAD_FIRST(ROW, WHEN, DECLARATIONS, LANES) CRT_LOAD_FIRST_##WHEN(ROW, LANES)
-#define CRT_LOAD_FIRST_VERTEX(ROW, LANES)
-#define CRT_LOAD_FIRST_TREE(ROW, LANES)
-#define CRT_LOAD_FIRST_BEGIN(ROW, LANES)
-#define CRT_LOAD_FIRST_FIRST(ROW, LANES) CRT_LOAD_ROW(ROW, LANES)
 CRT_FN void crt_load_first_hit(const CrtWave *wave, u32 slot, CrtPath *path) {
     f32 lane;
-    CRT_PATH_STATE(CRT_LOAD_FIRST)
+    CRT_PATH_STATE(CRT_NO_ROW, CRT_NO_ROW, CRT_NO_ROW, CRT_LOAD_ROW)
 }
 
 /* Numbers of a state that were taken while tracing. */

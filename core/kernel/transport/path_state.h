@@ -2,16 +2,18 @@
  * path_state.h: what a path carries from vertex to vertex, and how that is packed into rows of 16 bytes
  * where a schedule keeps it in memory.
  *
- * CRT_PATH_STATE(S) calls S(ROW, WHEN, declarations, lanes) for each row. `declarations` are the members of
- * CrtPath that the row holds, or begins to hold. `lanes` says which of them lie in the four lanes of the
- * row: V4 is one vec4; V3 a vec3 and another lane; F4 four lanes; F1 one lane. A lane is an F32 or U32
- * member, WORD (crt_path_word), NUMBERS (what the sampler must remember) or UNUSED. WHEN says when the row
- * changes:
+ * CRT_PATH_STATE(VERTEX, TREE, BEGIN, FIRST) calls, for each row, one of these with (ROW, declarations,
+ * lanes). Which one says when the row changes:
  *
  *   VERTEX  at each vertex
  *   TREE    at each vertex, in scenes with a tree of lights
  *   BEGIN   where a sample begins; shade.h and shadow rays add to its radiance
  *   FIRST   at the first vertex, in scenes with AOVs
+ *
+ * `declarations` are the members of CrtPath that the row holds, or begins to hold. `lanes` says which
+ * members lie in the four lanes of the row: V4 is one vec4; V3 a vec3 and another lane; F4 four lanes; F1
+ * one lane. A lane is an F32 or U32 member, WORD (crt_path_word), NUMBERS (what the sampler must remember)
+ * or UNUSED.
  */
 #ifndef CRT_PATH_STATE_H
 #define CRT_PATH_STATE_H
@@ -33,23 +35,23 @@ CRT_KERNEL_BEGIN
  *   media           around the ray where it begins (medium.h)
  *   side            the normal at p (crt_scattering_side)
  */
-#define CRT_PATH_STATE(S)                                                                         \
-    S(ORIGIN, VERTEX, CrtRay ray; u32 depth; vec4 hero; int alone;, V3(ray.o, WORD))              \
-    S(DIRECTION, VERTEX, CrtSampler sampler;, V3(ray.d, NUMBERS))                                 \
-    S(THROUGHPUT, VERTEX, vec4 throughput;, V4(throughput))                                       \
-    S(RADIANCE, BEGIN, vec4 radiance;, V4(radiance))                                              \
-    S(WAVELENGTHS, BEGIN, CrtWavelengths wavelengths;, V4(wavelengths.position))                  \
-    S(POINT, VERTEX, vec3 p; f32 scatter_pdf;, V3(p, F32(scatter_pdf)))                           \
-    S(REST, VERTEX, f32 scatter_cosine; f32 eta_square; u32 media;,                               \
-      F4(F32(scatter_cosine), F32(eta_square), F32(wavelengths.u), U32(media)))                   \
-    S(SIDE, TREE, vec3 side;, V3(side, UNUSED))                                                   \
-    S(ALBEDO, FIRST, CrtFirstHit first;, V4(first.albedo))                                        \
-    S(NORMAL, FIRST, , V3(first.normal, F32(first.depth)))                                        \
-    S(PRIMITIVE, FIRST, , F1(U32(first.primitive)))
+#define CRT_PATH_STATE(VERTEX, TREE, BEGIN, FIRST)                                              \
+    VERTEX(ORIGIN, CrtRay ray; u32 depth; vec4 hero; int alone;, V3(ray.o, WORD))               \
+    VERTEX(DIRECTION, CrtSampler sampler;, V3(ray.d, NUMBERS))                                  \
+    VERTEX(THROUGHPUT, vec4 throughput;, V4(throughput))                                        \
+    BEGIN(RADIANCE, vec4 radiance;, V4(radiance))                                               \
+    BEGIN(WAVELENGTHS, CrtWavelengths wavelengths;, V4(wavelengths.position))                   \
+    VERTEX(POINT, vec3 p; f32 scatter_pdf;, V3(p, F32(scatter_pdf)))                            \
+    VERTEX(REST, f32 scatter_cosine; f32 eta_square; u32 media;,                                \
+           F4(F32(scatter_cosine), F32(eta_square), F32(wavelengths.u), U32(media)))            \
+    TREE(SIDE, vec3 side;, V3(side, UNUSED))                                                    \
+    FIRST(ALBEDO, CrtFirstHit first;, V4(first.albedo))                                         \
+    FIRST(NORMAL, , V3(first.normal, F32(first.depth)))                                         \
+    FIRST(PRIMITIVE, , F1(U32(first.primitive)))
 
-#define CRT_PATH_MEMBERS(ROW, WHEN, DECLARATIONS, LANES) DECLARATIONS
+#define CRT_PATH_MEMBERS(ROW, DECLARATIONS, LANES) DECLARATIONS
 typedef struct CrtPath {
-    CRT_PATH_STATE(CRT_PATH_MEMBERS)
+    CRT_PATH_STATE(CRT_PATH_MEMBERS, CRT_PATH_MEMBERS, CRT_PATH_MEMBERS, CRT_PATH_MEMBERS)
     u32 met; /* material that the ray has found a mix to be of (passing.h); or CRT_NONE */
 } CrtPath;
 
