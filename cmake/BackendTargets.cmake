@@ -1,5 +1,5 @@
 # What a backend builds against, in this tree and installed under the same names:
-#   crt::backend_headers  backend/crt_backend.h, backend/sdk/*.h, the layout hash, kernel/*.h
+#   crt::backend_headers  backend/crt_backend.h, backend/sdk/*.h, the layout hash, kernel/*/*.h
 #   crt::kernel_cache     backend/sdk/kernel_cache.h and its code, to be linked into the plugin
 
 include(LayoutHash)
@@ -8,9 +8,8 @@ include(EmbedKernels)
 
 add_library(crt_backend_headers INTERFACE)
 add_library(crt::backend_headers ALIAS crt_backend_headers)
+target_link_libraries(crt_backend_headers INTERFACE $<BUILD_INTERFACE:crt_backend_sdk>)
 target_include_directories(crt_backend_headers INTERFACE
-  $<BUILD_INTERFACE:${PROJECT_BINARY_DIR}/rooms/crt_kernel>
-  $<BUILD_INTERFACE:${PROJECT_BINARY_DIR}/rooms/crt_backend_sdk>
   $<BUILD_INTERFACE:${PROJECT_BINARY_DIR}/generated>
   $<INSTALL_INTERFACE:include/crt>)
 set_target_properties(crt_backend_headers PROPERTIES EXPORT_NAME backend_headers)

@@ -4,11 +4,12 @@
 #            [HEADERS <file of core/>…] [COLD <file>…|ALL])
 #
 # makes the static library crt_<folder> (a '/' becomes '_') of core/<folder>, or an interface library where
-# it has headers alone. HEADERS are further ones that it shows. COLD: files in which nothing takes time; they
-# are compiled for size. Its headers are included as "<folder>/<name>.h". Each room has an include root of
-# its own, build/rooms/<target>, which holds links to its headers and to nothing else: a file sees the
-# headers of the rooms that its own room USES, and of those that these use. So an include against the arrows
-# does not compile. tests/rooms/check_rooms.py draws the arrows, and fails when there is a cycle.
+# it has headers alone, which are then compiled once for themselves. HEADERS are further ones that it shows.
+# COLD: files in which nothing takes time; they are compiled for size. Its headers are included as
+# "<folder>/<name>.h". Each room has an include root of its own, build/rooms/<target>, which holds links to
+# its headers and to nothing else: a file sees the headers of the rooms that its own room USES, and of those
+# that these use. So an include against the arrows does not compile. tests/rooms/check_rooms.py draws the
+# arrows, and fails when there is a cycle.
 
 set_property(GLOBAL PROPERTY CRT_ROOMS "")
 
@@ -45,6 +46,20 @@ function(_crt_cold_part target folder)
   target_sources(${target} PRIVATE $<TARGET_OBJECTS:${target}_cold>)
 endfunction()
 
+# Compiles the headers of a room that has nothing else, with no other include roots than those it sees.
+function(_crt_compile_headers target folder)
+  file(GLOB headers CONFIGURE_DEPENDS RELATIVE ${PROJECT_SOURCE_DIR}/core
+    ${PROJECT_SOURCE_DIR}/core/${folder}/*.h)
+  list(TRANSFORM headers REPLACE "(.+)" "#include \"\\1\"\n")
+  list(JOIN headers "" text)
+  set(file ${PROJECT_BINARY_DIR}/generated/rooms/${target}_headers.cpp)
+  file(CONFIGURE OUTPUT ${file} CONTENT "${text}" @ONLY)
+  add_library(${target}_headers OBJECT ${file})
+  target_compile_options(${target}_headers PRIVATE $<$<CONFIG:Release>:-O0>)
+  target_include_directories(${target}_headers PRIVATE ${PROJECT_BINARY_DIR}/generated)  # the layout hash
+  target_link_libraries(${target}_headers PRIVATE ${target} crt_flags)
+endfunction()
+
 function(crt_room folder)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES;USES;LIBRARIES;HEADERS;COLD")
   string(REPLACE "/" "_" name ${folder})
@@ -75,6 +90,7 @@ function(crt_room folder)
     add_library(${target} INTERFACE)
     target_include_directories(${target} INTERFACE ${PROJECT_BINARY_DIR}/rooms/${target})
     target_link_libraries(${target} INTERFACE ${used} ${arg_LIBRARIES})
+    _crt_compile_headers(${target} ${folder})
   endif()
   set_property(GLOBAL APPEND PROPERTY CRT_ROOMS ${target})
 endfunction()

@@ -4,8 +4,8 @@
 #include "conformance.h"
 
 #include "bits_hashes.h"
-#include "kernel/bits_version.h"
-#include "kernel/features.h"
+#include "kernel/dialect/bits_version.h"
+#include "kernel/dialect/features.h"
 #include "render/session.h"
 
 #include <fmt/format.h>
@@ -725,8 +725,9 @@ TEST_CASE("a change of bits needs a new version of them", "[bits]") {
         if (line.version == CRT_BITS_VERSION) stored[line.name] = line.hash;
     INFO("bits version "
          << CRT_BITS_VERSION
-         << ": raise CRT_BITS_VERSION and store the new hash (core/kernel/bits_version.h says when): "
-            "CRT_UPDATE_BITS=tests/bits_hashes.txt crt_conformance --backend embree 'a change of bits*'");
+         << ": raise CRT_BITS_VERSION and store the new hash (core/kernel/dialect/bits_version.h says "
+            "when): CRT_UPDATE_BITS=tests/bits_hashes.txt crt_conformance --backend embree "
+            "'a change of bits*'");
     for (const auto& [name, hash] : rendered) {
         INFO(name);
         CHECK(hash == stored[name]);

@@ -4,7 +4,7 @@
 
 #include "catch.h"
 #include "compile/compile.h"
-#include "kernel/path.h"
+#include "kernel/integrators/path.h"
 
 #include <cmath>
 #include <cstdint>

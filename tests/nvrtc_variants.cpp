@@ -16,8 +16,8 @@
 #include "backend/sdk/gpu_schedule.h"
 #include "base/error.h"
 #include "compile/compile.h"
-#include "kernel/features.h"
-#include "kernel/layout.h"
+#include "kernel/dialect/features.h"
+#include "kernel/dialect/layout.h"
 #include "render/outputs.h"
 #include "scene/yaml/scene_yaml.h"
 
@@ -137,7 +137,7 @@ int run(int argc, char** argv) {
     }
 
     const CrtHost host = crt::makeHost(false);
-    const char* wavefront_text = host.kernel_source(host.user, "wavefront.h");
+    const char* wavefront_text = host.kernel_source(host.user, "kernel/schedule/wavefront.h");
     if (wavefront_text == nullptr)
         throw std::runtime_error("the program holds no kernel source wavefront.h");
     const std::string text = crt::cuda::kernelText(wavefront_text);
@@ -166,7 +166,7 @@ int run(int argc, char** argv) {
         // The one with everything in is compiled ahead of time, for three blocks (its CMakeLists.txt).
         const crt::cuda::Cubin cubin =
             spec.features == CRT_FEATURES_ALL
-                ? nvrtc.compile(text, "wavefront.h", crt::cuda::nvrtcOptions(arch, spec, 3))
+                ? nvrtc.compile(text, "kernel/schedule/wavefront.h", crt::cuda::nvrtcOptions(arch, spec, 3))
                 : crt::cuda::compileLean(nvrtc, text, arch, spec);
         const double ms =
             std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();

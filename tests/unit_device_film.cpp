@@ -3,7 +3,7 @@
 #include "backend/loader.h"
 #include "catch.h"
 #include "fake_plugins/fake_pattern.h"
-#include "kernel/layout.h"
+#include "kernel/dialect/layout.h"
 #include "render/device_film.h"
 #include "render/sampling.h"
 #include "render/session.h"

@@ -8,8 +8,8 @@
 
 #include "catch.h"
 #include "cli/progress.h"
-#include "kernel/layout.h"
-#include "kernel/sampler.h"
+#include "kernel/dialect/layout.h"
+#include "kernel/sampling/sampler.h"
 #include "render/sampling.h"
 
 #include <array>

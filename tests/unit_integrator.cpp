@@ -5,7 +5,7 @@
 #include "base/listener.h"
 #include "catch.h"
 #include "fake_plugins/fake_pattern.h"
-#include "kernel/layout.h"
+#include "kernel/dialect/layout.h"
 
 #include <algorithm>
 #include <cstdint>

@@ -1,5 +1,5 @@
-// kernel/math.h against long double and exact integers: what its comments promise in ulps, signs that must
-// be exact, sums that lose nothing.
+// kernel/dialect/math.h against long double and exact integers: what its comments promise in ulps, signs
+// that must be exact, sums that lose nothing.
 #include "kernel_test.h"
 
 #include <algorithm>

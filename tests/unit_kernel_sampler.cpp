@@ -1,6 +1,6 @@
-// kernel/sampler.h: Philox against its authors' known answers, Sobol against its definition, and of all
-// three samplers what an integrator counts on: uniform, never 0 or 1, and no dimension, pixel, sample or
-// seed that knows of another.
+// kernel/sampling/sampler.h: Philox against its authors' known answers, Sobol against its definition, and
+// of all three samplers what an integrator counts on: uniform, never 0 or 1, and no dimension, pixel,
+// sample or seed that knows of another.
 #include "kernel_test.h"
 
 #include <algorithm>

@@ -6,7 +6,7 @@
 #include "base/error.h"
 #include "catch.h"
 #include "base/temporary_folder.h"
-#include "kernel/bits_version.h"
+#include "kernel/dialect/bits_version.h"
 
 #include <unistd.h>
 
@@ -223,16 +223,17 @@ TEST_CASE("the host's functions throw nothing at a plugin", "[loader]") {
     host.log(host.user, 99, "a level of the future");
     CHECK(host.progress(host.user, 0.5) == 0);
     CHECK(host.kernel_source(host.user, nullptr) == nullptr);
-    CHECK(host.kernel_source(host.user, "no_such_kernel.h") == nullptr);
-    CHECK(host.kernel_source(host.user, "../error.h") == nullptr);
+    CHECK(host.kernel_source(host.user, "kernel/no_such_kernel.h") == nullptr);
+    CHECK(host.kernel_source(host.user, "base/error.h") == nullptr);
+    CHECK(host.kernel_source(host.user, "kernel/../base/error.h") == nullptr);
 }
 
 TEST_CASE("kernel sources come with their includes, once each", "[loader]") {
     const ScopedVariable embedded("CRT_KERNEL_DIR", std::nullopt);
     const CrtHost host = makeHost(false);
-    const char* text = host.kernel_source(host.user, "layout.h");
+    const char* text = host.kernel_source(host.user, "kernel/dialect/layout.h");
     REQUIRE(text != nullptr);
-    CHECK(text == host.kernel_source(host.user, "layout.h"));
+    CHECK(text == host.kernel_source(host.user, "kernel/dialect/layout.h"));
     const std::string source = text;
     CHECK_THAT(source, Contains("typedef struct CrtScene") && Contains("#define CRT_DIALECT_H"));
     CHECK_THAT(source, !Contains("#include \""));
@@ -241,7 +242,7 @@ TEST_CASE("kernel sources come with their includes, once each", "[loader]") {
 
 TEST_CASE("the whole kernel is one text", "[loader]") {
     const ScopedVariable embedded("CRT_KERNEL_DIR", std::nullopt);
-    const char* text = kernelSource("path.h");
+    const char* text = kernelSource("kernel/integrators/path.h");
     REQUIRE(text != nullptr);
     const std::string source = text;
     CHECK_THAT(source, !Contains("#include \""));
@@ -285,24 +286,24 @@ TEST_CASE("expanding includes", "[loader]") {
 
 TEST_CASE("CRT_KERNEL_DIR replaces the embedded sources", "[loader]") {
     const TemporaryFolder directory;
-    for (const char* header : {CRT_LAYOUT_HEADERS, "dialect.h"}) {
-        fs::copy(fs::path(CRT_SOURCE_DIR) / "core/kernel" / header, directory.path());
-    }
-    directory.write("path.h", "#include \"layout.h\"\nint changed;\n");
+    fs::create_directory(fs::path(directory.path()) / "integrators");
+    fs::copy(fs::path(CRT_SOURCE_DIR) / "core/kernel/dialect", fs::path(directory.path()) / "dialect");
+    directory.write("integrators/path.h", "#include \"kernel/dialect/layout.h\"\nint changed;\n");
     const ScopedVariable kernels("CRT_KERNEL_DIR", directory.path());
-    REQUIRE(kernelSource("path.h") != nullptr);
-    CHECK_THAT(kernelSource("path.h"), Contains("int changed;") && Contains("typedef struct CrtScene"));
+    const char* text = kernelSource("kernel/integrators/path.h");
+    REQUIRE(text != nullptr);
+    CHECK_THAT(text, Contains("int changed;") && Contains("typedef struct CrtScene"));
     // All or nothing: what is not there is not taken from the program.
-    CHECK(kernelSource("bsdf.h") == nullptr);
+    CHECK(kernelSource("kernel/materials/bsdf.h") == nullptr);
 
     // A layout of another build would misread the scene. Another directory, because texts once handed out
     // stay.
     const TemporaryFolder other;
     fs::copy(directory.path(), other.path(), fs::copy_options::recursive);
-    other.write("layout.h", "struct Changed;\n");
+    other.write("dialect/layout.h", "struct Changed;\n");
     const ScopedVariable changed("CRT_KERNEL_DIR", other.path());
-    CHECK_THROWS_WITH(kernelSource("path.h"),
-                      Contains("holds another layout.h than this crt was built with"));
+    CHECK_THROWS_WITH(kernelSource("kernel/integrators/path.h"),
+                      Contains("holds another kernel/dialect/layout.h than this crt was built with"));
     const CrtHost host = makeHost(false);
-    CHECK(host.kernel_source(host.user, "path.h") == nullptr);
+    CHECK(host.kernel_source(host.user, "kernel/integrators/path.h") == nullptr);
 }

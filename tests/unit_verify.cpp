@@ -7,8 +7,8 @@
 #include "judge/verify/references.h"
 #include "judge/verify/report.h"
 #include "judge/verify/variants.h"
-#include "kernel/features.h"
-#include "kernel/layout.h"
+#include "kernel/dialect/features.h"
+#include "kernel/dialect/layout.h"
 
 #include <fmt/format.h>
 

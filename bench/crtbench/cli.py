@@ -88,7 +88,7 @@ def main():
                 "--features",
                 nargs="+",
                 metavar="NAME",
-                help="only these of core/kernel/features.h, such as THIN_FILM",
+                help="only these of core/kernel/dialect/features.h, such as THIN_FILM",
             )
             command.add_argument(
                 "--backends",

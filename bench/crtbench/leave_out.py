@@ -18,7 +18,7 @@ def chosen_bits(program, names):
     """Those of the features that were asked for, or all."""
     bits = feature_bits(program.repository)
     if unknown := set(names or []) - {name for _, name, _ in bits}:
-        raise Failure(f"there is no feature {sorted(unknown)[0]}; core/kernel/features.h lists them")
+        raise Failure(f"there is no feature {sorted(unknown)[0]}; core/kernel/dialect/features.h lists them")
     return [b for b in bits if not names or b[1] in names]
 
 

@@ -258,8 +258,8 @@ class Program:
             "#undef CRT_KERNEL_MATERIALS\n#define CRT_KERNEL_MATERIALS (CRT_MORE & CRT_FEATURES_MATERIALS)\n"
             "#else\n#define CRT_HAS(name) (0)\n#endif\n"
         )
-        include = '#include "layout.h"\n'
-        users = [h for h in directory.glob("*.h") if include in h.read_text()]
+        include = '#include "kernel/dialect/layout.h"\n'
+        users = [h for h in directory.glob("*/*.h") if include in h.read_text()]
         if not users:
             raise Failure("no kernel header includes layout.h: kernels_with() has to be taught the new way")
         for header in users:
@@ -268,11 +268,11 @@ class Program:
 
 
 def feature_bits(repository):
-    """[(bit, NAME, text)] of core/kernel/features.h."""
-    text = (repository / "core" / "kernel" / "features.h").read_text()
+    """[(bit, NAME, text)] of core/kernel/dialect/features.h."""
+    text = (repository / "core" / "kernel" / "dialect" / "features.h").read_text()
     found = re.findall(r'(?:F\(|M\(F, )(\d+), (\w+),[\w,\s\\]*"([^"]*)"\)', text)
     if not found:
-        raise Failure("core/kernel/features.h lists no features in the form F(bit, NAME, \"text\")")
+        raise Failure("core/kernel/dialect/features.h lists no features in the form F(bit, NAME, \"text\")")
     return [(int(bit), name, what) for bit, name, what in found]
 
 

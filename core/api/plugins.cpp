@@ -1,6 +1,6 @@
 #include "api/border.h"
 #include "backend/loader.h"
-#include "kernel/bits_version.h"
+#include "kernel/dialect/bits_version.h"
 
 namespace crt::v0 {
 

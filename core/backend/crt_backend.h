@@ -8,9 +8,9 @@
  *
  * Versioning. Every struct begins with its own size. A minor revision only appends members; a reader uses a
  * member only if the writer's struct_size covers it. A change of meaning or order is a new major version and
- * a new symbol name. The layout hash covers kernel/layout.h, channels.h and features.h: the scene blob is
- * read as C structs, so it must be equal. The bits version says that samples are the same: it must be equal
- * too, or one image would hold samples of two renderers.
+ * a new symbol name. The layout hash covers kernel/dialect/layout.h, channels.h and features.h: the scene
+ * blob is read as C structs, so it must be equal. The bits version says that samples are the same: it must
+ * be equal too, or one image would hold samples of two renderers.
  *
  * Threads. Each function says who may call it: [owner thread] is the one thread at a time that uses an
  * integrator, [any thread] needs no care.
@@ -65,9 +65,9 @@ typedef struct CrtHost {
     int32_t (*progress)(void *user, double done);
     /* Directory for compiled kernels, existing and writable, or null when caching is off. */
     const char *cache_directory;
-    /* Text of a kernel header ("path.h") with its includes expanded, or null when the name is unknown. Lives
-       as long as the host. This is the same text for every backend: it may be compiled as C++17, CUDA C++ or
-       OpenCL C 1.2. [any thread] */
+    /* Text of a kernel header ("kernel/integrators/path.h") with its includes expanded, or null when the
+       name is unknown. Lives as long as the host. This is the same text for every backend: it may be
+       compiled as C++17, CUDA C++ or OpenCL C 1.2. [any thread] */
     const char *(*kernel_source)(void *user, const char *name);
 } CrtHost;
 
@@ -99,7 +99,8 @@ typedef struct CrtCreateInfo {
     uint32_t tile_size;       /* hint, pixels; 0 means the backend's own. Never changes the image. */
 } CrtCreateInfo;
 
-/* The compiled scene: kernel/layout.h read from the first byte of `data`, 64-byte aligned; pointer-free. */
+/* The compiled scene: kernel/dialect/layout.h read from the first byte of `data`, 64-byte aligned;
+   pointer-free. */
 typedef struct CrtSceneBlob {
     uint32_t struct_size;
     uint32_t reserved;
@@ -186,7 +187,7 @@ typedef struct CrtBackend {
     const char *name;     /* as in crt_backend_<name>.so */
     const char *version;
     const char *build;    /* compiler and libraries, for humans */
-    uint64_t features;    /* mask of kernel/features.h that it can run */
+    uint64_t features;    /* mask of kernel/dialect/features.h that it can run */
     /* Lists devices: writes at most `capacity`, sets *count to how many there are. No device is a normal
        answer: CRT_NO_DEVICE with a one-sentence reason in `reason` (NUL-terminated, cut to reason_size).
        Quick; touches no kernel. [any thread] */
@@ -195,8 +196,8 @@ typedef struct CrtBackend {
     /* Opens a device. On failure *integrator is untouched and `reason` says why. [any thread] */
     CrtStatus (*create)(const CrtHost *host, const CrtCreateInfo *info, CrtIntegrator *integrator,
                         char *reason, uint32_t reason_size);
-    /* Since 1.1: CRT_BITS_VERSION (kernel/bits_version.h) of the headers it was built with. Without it: 1.
-     */
+    /* Since 1.1: CRT_BITS_VERSION (kernel/dialect/bits_version.h) of the headers it was built with. Without
+       it: 1. */
     uint32_t bits_version;
     uint32_t reserved;
     /* Since 1.2: bits of CRT_BRINGS_…, and what belongs to them. Without it: nothing. */

@@ -5,7 +5,7 @@
 #include "base/error.h"
 #include "base/listener.h"
 #include "base/log.h"
-#include "kernel/layout.h"
+#include "kernel/dialect/layout.h"
 
 #include <algorithm>
 #include <array>

@@ -20,6 +20,10 @@
 namespace crt {
 namespace {
 
+/// Kernel headers are named as they include each other: "kernel/geometry/ray.h". CRT_KERNEL_DIR is the
+/// folder `kernel`.
+constexpr std::string_view kRoot = "kernel/";
+
 using TextOf = std::function<std::optional<std::string>(const std::string&)>;
 
 std::optional<std::string> embeddedText(const std::string& name) {
@@ -32,7 +36,7 @@ std::optional<std::string> embeddedText(const std::string& name) {
 
 std::optional<std::string> textIn(const std::string& directory, const std::string& name) {
     constexpr std::uint64_t kMostBytes = std::uint64_t{16} << 20;
-    const std::string path = directory + '/' + name;
+    const std::string path = directory + name.substr(kRoot.size() - 1);
     if (::access(path.c_str(), F_OK) != 0) return std::nullopt;
     const trust::Judged judged = trust::judge(path);
     if (!judged.why.empty())
@@ -127,7 +131,7 @@ std::string expandIncludes(const std::string& name, const TextOf& text_of) {
 const char* kernelSource(const std::string& name) {
     const char* value = std::getenv("CRT_KERNEL_DIR");
     const std::string directory = value != nullptr ? value : "";
-    if (name.find('/') != std::string::npos) return nullptr;
+    if (name.rfind(kRoot, 0) != 0 || name.find("..") != std::string::npos) return nullptr;
 
     // Texts are kept for good, because plugins hold pointers to them. Leaked, so that they outlive every
     // static object.

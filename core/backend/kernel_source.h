@@ -13,16 +13,17 @@ namespace crt {
 
 /// One embedded header.
 struct KernelFile {
-    const char* name;
+    const char* name;  ///< As it is included: "kernel/geometry/ray.h".
     const char* text;
 };
 extern const KernelFile kKernelFiles[];
 extern const std::size_t kKernelFileCount;
 
-/// Text of a kernel header with its quoted includes expanded, or null when there is none of that name. Lives
-/// as long as the process. Throws crt::Error(Internal) when an include names a header that does not exist,
-/// crt::Error(Backend) when CRT_KERNEL_DIR holds another of the headers that the layout hash covers than
-/// this program was built with: the kernel would misread the scene. [any thread]
+/// Text of a kernel header ("kernel/schedule/wavefront.h") with its quoted includes expanded, or null when
+/// there is none of that name. Lives as long as the process. Throws crt::Error(Internal) when an include
+/// names a header that does not exist, crt::Error(Backend) when CRT_KERNEL_DIR holds another of the headers
+/// that the layout hash covers than this program was built with: the kernel would misread the scene. [any
+/// thread]
 const char* kernelSource(const std::string& name);
 
 /// The expansion itself: `text_of` gives a header's text or nothing. An include that is certain to be

@@ -7,7 +7,7 @@
 #include "base/log.h"
 #include "base/modules.h"
 #include "base/words.h"
-#include "kernel/bits_version.h"
+#include "kernel/dialect/bits_version.h"
 
 #include <dlfcn.h>
 #include <elf.h>

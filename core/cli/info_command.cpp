@@ -12,7 +12,7 @@
 #include "film/error_text.h"
 #include "image/image_io.h"
 #include "image/image_metadata.h"
-#include "kernel/features.h"
+#include "kernel/dialect/features.h"
 #include "render/job.h"
 #include "render/outputs.h"
 

@@ -1,7 +1,7 @@
 #include "compile/accelerator.h"
 
 #include "base/parallel.h"
-#include "kernel/intersect.h"
+#include "kernel/geometry/intersect.h"
 
 #include <algorithm>
 #include <chrono>

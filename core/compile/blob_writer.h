@@ -1,11 +1,11 @@
-/// The block of memory that a compiled scene is (kernel/layout.h), while it grows.
+/// The block of memory that a compiled scene is (kernel/dialect/layout.h), while it grows.
 #pragma once
 
 #include "base/error.h"
 #include "base/huge_pages.h"
 #include "base/parallel.h"
 #include "compile/compile.h"
-#include "kernel/layout.h"
+#include "kernel/dialect/layout.h"
 
 #include <cstddef>
 #include <cstdint>

@@ -1,6 +1,7 @@
 #include "compile/brightest_path.h"
 
-#include "kernel/path.h"
+#include "kernel/geometry/slots.h"
+#include "kernel/transport/shade.h"
 
 #include <algorithm>
 #include <cmath>

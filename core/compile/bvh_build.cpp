@@ -4,7 +4,7 @@
 #include "base/stage.h"
 #include "compile/bvh_collapse.h"
 #include "compile/bvh_reinsert.h"
-#include "kernel/bvh.h"
+#include "kernel/geometry/bvh.h"
 
 #include <algorithm>
 #include <atomic>

@@ -2,7 +2,7 @@
 /// at load, on the host.
 #pragma once
 
-#include "kernel/layout.h"
+#include "kernel/dialect/layout.h"
 
 #include <array>
 #include <cstdint>

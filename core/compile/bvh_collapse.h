@@ -3,7 +3,7 @@
 #pragma once
 
 #include "compile/bvh_tree.h"
-#include "kernel/layout.h"
+#include "kernel/dialect/layout.h"
 
 namespace crt {
 

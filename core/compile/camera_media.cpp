@@ -2,7 +2,7 @@
 
 #include "base/log.h"
 #include "base/vec3d.h"
-#include "kernel/medium.h"
+#include "kernel/materials/medium.h"
 
 #include <algorithm>
 #include <array>

@@ -4,7 +4,7 @@
 #include "compile/accelerator.h"
 #include "compile/camera_media.h"
 #include "compile/settings.h"
-#include "kernel/features.h"
+#include "kernel/dialect/features.h"
 
 namespace crt {
 

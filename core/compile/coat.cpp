@@ -3,7 +3,7 @@
 #include "base/parallel.h"
 #include "compile/reflectance.h"
 #include "compile/visible_normals.h"
-#include "kernel/bsdf.h"
+#include "kernel/materials/bsdf.h"
 
 #include <algorithm>
 #include <cmath>

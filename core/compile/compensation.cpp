@@ -2,7 +2,7 @@
 
 #include "base/parallel.h"
 #include "compile/reflectance.h"
-#include "kernel/bsdf.h"
+#include "kernel/materials/bsdf.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,11 +1,11 @@
-/// What rough surfaces give back of the light that their microfacets lose (kernel/compensation.h): tables of
-/// the losses, worked out before rendering.
+/// What rough surfaces give back of the light that their microfacets lose
+/// (kernel/materials/compensation.h): tables of the losses, worked out before rendering.
 #pragma once
 
 #include "compile/blob_writer.h"
 #include "compile/loss_table.h"
 #include "compile/table_work.h"
-#include "kernel/layout.h"
+#include "kernel/dialect/layout.h"
 #include "scene/scene.h"
 
 #include <cstdint>

@@ -22,8 +22,8 @@
 #include "compile/spectrum_table.h"
 #include "compile/textures.h"
 #include "compile/touching_media.h"
-#include "kernel/features.h"
-#include "kernel/layout.h"
+#include "kernel/dialect/features.h"
+#include "kernel/dialect/layout.h"
 
 #include <algorithm>
 #include <chrono>

@@ -1,5 +1,5 @@
-/// Scene → CompiledScene: one flat, pointer-free blob (kernel/layout.h) and the feature mask that says
-/// what it needs.
+/// Scene → CompiledScene: one flat, pointer-free blob (kernel/dialect/layout.h) and the feature mask that
+/// says what it needs.
 #pragma once
 
 #include "scene/scene.h"
@@ -17,7 +17,7 @@ struct CompiledScene {
     };
     std::vector<Line> blob;           ///< Read it through data(): 64-byte aligned.
     std::size_t size_bytes = 0;
-    std::uint64_t features = 0;       ///< kernel/features.h
+    std::uint64_t features = 0;       ///< kernel/dialect/features.h
     std::uint32_t width = 0, height = 0;  ///< Of the crop window.
     std::uint32_t channels = 0;       ///< Film channels.
     std::uint32_t aovs = 0;

@@ -1,6 +1,6 @@
 #include "compile/coplanar.h"
 
-#include "kernel/layout.h"
+#include "kernel/dialect/layout.h"
 
 #include <algorithm>
 #include <cmath>

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "compile/blob_writer.h"
-#include "kernel/layout.h"
+#include "kernel/dialect/layout.h"
 #include "scene/scene.h"
 
 namespace crt {

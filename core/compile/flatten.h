@@ -5,7 +5,7 @@
 #include "compile/focus.h"
 #include "compile/placements.h"
 #include "compile/shapes.h"
-#include "kernel/layout.h"
+#include "kernel/dialect/layout.h"
 #include "scene/scene.h"
 
 #include <array>

@@ -2,7 +2,7 @@
 
 #include "base/parallel.h"
 #include "base/vec3d.h"
-#include "kernel/surface.h"
+#include "kernel/geometry/surface.h"
 
 #include <algorithm>
 #include <cmath>

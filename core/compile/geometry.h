@@ -4,7 +4,7 @@
 #include "compile/accelerator.h"
 #include "compile/coplanar.h"
 #include "compile/flatten.h"
-#include "kernel/layout.h"
+#include "kernel/dialect/layout.h"
 
 #include <cstddef>
 #include <cstdint>

@@ -2,7 +2,7 @@
 
 #include "base/error.h"
 #include "base/vec3d.h"
-#include "kernel/intersect.h"
+#include "kernel/geometry/intersect.h"
 
 #include <algorithm>
 #include <array>

@@ -1,4 +1,4 @@
-/// Meshes that are stored once and placed many times (kernel/instances.h).
+/// Meshes that are stored once and placed many times (kernel/geometry/instances.h).
 #pragma once
 
 #include "compile/accelerator.h"

@@ -1,8 +1,8 @@
-/// The tree by which many lights are chosen (kernel/light_tree.h).
+/// The tree by which many lights are chosen (kernel/lights/light_tree.h).
 #pragma once
 
 #include "base/vec3d.h"
-#include "kernel/layout.h"
+#include "kernel/dialect/layout.h"
 
 #include <cstdint>
 #include <vector>

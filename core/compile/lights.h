@@ -6,7 +6,7 @@
 #include "compile/environment_image.h"
 #include "compile/flatten.h"
 #include "compile/spectrum_table.h"
-#include "kernel/layout.h"
+#include "kernel/dialect/layout.h"
 #include "scene/scene.h"
 
 #include <cstddef>

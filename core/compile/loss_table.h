@@ -1,8 +1,8 @@
-/// One table of what the microfacets of a rough surface lose (kernel/compensation.h): what it depends on,
-/// what it costs, and its values.
+/// One table of what the microfacets of a rough surface lose (kernel/materials/compensation.h): what it
+/// depends on, what it costs, and its values.
 #pragma once
 
-#include "kernel/layout.h"
+#include "kernel/dialect/layout.h"
 
 #include <compare>
 #include <vector>

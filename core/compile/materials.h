@@ -8,7 +8,7 @@
 #include "compile/spectrum_table.h"
 #include "compile/table_work.h"
 #include "compile/textures.h"
-#include "kernel/layout.h"
+#include "kernel/dialect/layout.h"
 #include "scene/scene.h"
 
 #include <cstddef>
@@ -41,10 +41,12 @@ std::vector<const Spectrum*> spectraOfMaterials(const std::vector<const Material
 
 struct MaterialPart {
     std::vector<kernel::CrtMaterial> records;
-    std::vector<kernel::CrtValue> media;  ///< Absorption of the media that surfaces bound (kernel/medium.h).
-    std::uint64_t features = 0;           ///< Of the materials that are used.
+    /// Absorption of the media that surfaces bound (kernel/materials/medium.h).
+    std::vector<kernel::CrtValue> media;
+    std::uint64_t features = 0;  ///< Of the materials that are used.
 };
-/// Bits of a medium's number in a list of media (kernel/medium.h): 1, 2, 4, 8 or 16; 0 without media.
+/// Bits of a medium's number in a list of media (kernel/materials/medium.h): 1, 2, 4, 8 or 16; 0 without
+/// media.
 std::uint32_t mediumBits(std::size_t media);
 MaterialPart compileMaterials(const std::vector<const Material*>& materials, const MaterialTables& tables,
                               const SpectrumTable& spectra, const TexturePart& textures);

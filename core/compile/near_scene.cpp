@@ -5,7 +5,7 @@
 #include "compile/blob_writer.h"
 #include "compile/bvh_build.h"
 #include "compile/near_surfaces.h"
-#include "kernel/surface.h"
+#include "kernel/geometry/surface.h"
 
 #include <algorithm>
 #include <bit>

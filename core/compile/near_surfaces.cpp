@@ -1,6 +1,7 @@
 #include "compile/near_surfaces.h"
 
-#include "kernel/path.h"
+#include "kernel/geometry/slots.h"
+#include "kernel/geometry/surface.h"
 
 #include "base/parallel.h"
 #include "base/vec3d.h"

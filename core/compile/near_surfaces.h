@@ -3,7 +3,7 @@
 #pragma once
 
 #include "compile/compile.h"
-#include "kernel/layout.h"
+#include "kernel/dialect/layout.h"
 
 #include <cstddef>
 #include <cstdint>
@@ -15,7 +15,7 @@ namespace crt {
 struct NearSurfaces {
     std::uint64_t asked = 0;  ///< Triangles that were looked at: all, or an even choice of them.
     std::uint64_t near = 0;   ///< Of those: with another surface nearer than the clearance of either
-                              ///< (kernel/surface.h), yet not touching.
+                              ///< (kernel/geometry/surface.h), yet not touching.
     double nearest_clearance =
         0;  ///< The largest clearance that was too large for its neighbour, in the author's units.
 };

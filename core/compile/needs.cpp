@@ -3,7 +3,7 @@
 #include "compile/accelerator.h"
 #include "compile/light_tree.h"
 #include "compile/point_lights.h"
-#include "kernel/features.h"
+#include "kernel/dialect/features.h"
 #include "scene/aov.h"
 
 #include <fmt/format.h>

@@ -1,8 +1,8 @@
-/// What a kernel needs for a scene, as bits of kernel/features.h, and what it can leave out and why.
+/// What a kernel needs for a scene, as bits of kernel/dialect/features.h, and what it can leave out and why.
 #pragma once
 
 #include "compile/materials.h"
-#include "kernel/layout.h"
+#include "kernel/dialect/layout.h"
 #include "scene/scene.h"
 
 #include <cstddef>

@@ -1,5 +1,5 @@
 /// Rough diffuse bases of plastics, by EON: what one reflection loses, worked out before rendering
-/// (kernel/rough_base.h).
+/// (kernel/materials/rough_base.h).
 #pragma once
 
 #include "compile/coat.h"

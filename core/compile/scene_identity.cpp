@@ -1,6 +1,6 @@
 #include "compile/scene_identity.h"
 
-#include "kernel/bits_version.h"
+#include "kernel/dialect/bits_version.h"
 
 #include <fmt/format.h>
 

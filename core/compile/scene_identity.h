@@ -3,7 +3,7 @@
 /// kernel goes on with the films that are there.
 #pragma once
 
-#include "kernel/layout.h"
+#include "kernel/dialect/layout.h"
 
 #include <array>
 #include <string>

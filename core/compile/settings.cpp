@@ -3,7 +3,7 @@
 #include "base/error.h"
 #include "base/log.h"
 #include "base/vec3d.h"
-#include "kernel/sampler.h"
+#include "kernel/sampling/sampler.h"
 #include "scene/aov.h"
 
 #include <algorithm>

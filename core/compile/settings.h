@@ -2,7 +2,7 @@
 #pragma once
 
 #include "compile/flatten.h"
-#include "kernel/layout.h"
+#include "kernel/dialect/layout.h"
 #include "scene/scene.h"
 
 #include <cstdint>

@@ -2,7 +2,7 @@
 
 #include "base/error.h"
 #include "base/vec3d.h"
-#include "kernel/shapes.h"
+#include "kernel/geometry/shapes.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,7 +1,7 @@
 /// Spheres, disks and cylinders: objects with a shape → records of the blob.
 #pragma once
 
-#include "kernel/layout.h"
+#include "kernel/dialect/layout.h"
 #include "scene/scene.h"
 
 #include <array>

@@ -2,7 +2,7 @@
 /// which need none.
 #pragma once
 
-#include "kernel/layout.h"
+#include "kernel/dialect/layout.h"
 #include "scene/scene.h"
 
 #include <cstdint>

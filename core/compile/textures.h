@@ -3,7 +3,7 @@
 
 #include "compile/blob_writer.h"
 #include "compile/spectrum_table.h"
-#include "kernel/layout.h"
+#include "kernel/dialect/layout.h"
 #include "scene/scene.h"
 
 #include <cstdint>

@@ -2,8 +2,8 @@
 
 #include "compile/box.h"
 #include "compile/coplanar.h"
-#include "kernel/features.h"
-#include "kernel/layout.h"
+#include "kernel/dialect/features.h"
+#include "kernel/dialect/layout.h"
 
 #include <algorithm>
 #include <cstddef>

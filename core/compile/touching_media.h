@@ -1,5 +1,5 @@
 /// Bodies whose surfaces coincide. Rounding decides which of two coinciding surfaces a ray meets, so a path
-/// must not rely on having met both (kernel/medium.h).
+/// must not rely on having met both (kernel/materials/medium.h).
 #pragma once
 
 namespace crt {

@@ -11,7 +11,7 @@
 ///     48  char[32]       scene hash, hex digits
 ///     80  u32            bytes of the crt version text
 ///     84  u32            number of sample ranges
-///     88  u32            version of the bits (kernel/bits_version.h)
+///     88  u32            version of the bits (kernel/dialect/bits_version.h)
 ///     92  u32            bytes of the record
 ///     96  u64 × 2 each   sample ranges, first and end
 ///         char[]         crt version, zero-padded to 8
@@ -22,7 +22,7 @@
 ///             u32 each       primitive ids, [height][width]; only when the AOV mask has them
 ///
 /// Version 2, which is read still, has these sections as they are, the last zero-padded to 8 bytes, and no
-/// record; its films hold squares (kernel/channels.h) without a bit that says so.
+/// record; its films hold squares (kernel/dialect/channels.h) without a bit that says so.
 #pragma once
 
 #include "film/film.h"
@@ -39,8 +39,9 @@ namespace crt {
 struct FilmIdentity {
     std::string scene_hash;   ///< 32 hex digits: CompiledScene::hash.
     std::string version;      ///< Of crt.
-    std::uint32_t bits_version = CRT_BITS_VERSION;  ///< kernel/bits_version.h of the crt that rendered it.
-    std::optional<FilmRecord> record{};             ///< Films of format 2 (checkpoint.h) have none.
+    /// kernel/dialect/bits_version.h of the crt that rendered it.
+    std::uint32_t bits_version = CRT_BITS_VERSION;
+    std::optional<FilmRecord> record{};  ///< Films of format 2 (checkpoint.h) have none.
 };
 
 /// Checkpoint = partial = resume file. Written to a temporary name, synced and renamed.

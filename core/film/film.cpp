@@ -5,7 +5,7 @@
 #include "film/error_estimate.h"
 #include "film/luminance_error.h"
 #include "image/image_metadata.h"
-#include "kernel/layout.h"
+#include "kernel/dialect/layout.h"
 #include "scene/aov.h"
 
 #include <fmt/format.h>

@@ -9,7 +9,7 @@
 #include "compile/compile.h"
 #include "film/film_record.h"
 #include "image/development.h"
-#include "kernel/bits_version.h"
+#include "kernel/dialect/bits_version.h"
 
 #include <array>
 #include <cstdint>
@@ -41,7 +41,7 @@ private:
 
 struct FilmShape {
     std::uint32_t width = 0, height = 0;
-    std::uint32_t channels = 0;   ///< layout.h: X, Y, Z, then those of kernel/channels.h.
+    std::uint32_t channels = 0;   ///< layout.h: X, Y, Z, then those of kernel/dialect/channels.h.
     std::uint32_t aovs =
         0;  ///< Bits of Aov that need film channels or the primitive plane, kAovReplicates among them.
     std::uint32_t spectral = 0;  ///< Of these channels, the last: scene/spectral_film.h.

@@ -3,7 +3,7 @@
 #include "base/log.h"
 #include "base/parallel.h"
 #include "base/stopwatch.h"
-#include "kernel/layout.h"
+#include "kernel/dialect/layout.h"
 
 #include <algorithm>
 #include <cstring>

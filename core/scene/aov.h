@@ -1,9 +1,9 @@
-/// The rows of kernel/channels.h for the host: what a film holds of each pixel beside its colour, and what
-/// an image can be asked for.
+/// The rows of kernel/dialect/channels.h for the host: what a film holds of each pixel beside its colour,
+/// and what an image can be asked for.
 #pragma once
 
-#include "kernel/channels.h"
-#include "kernel/layout.h"
+#include "kernel/dialect/channels.h"
+#include "kernel/dialect/layout.h"
 
 #include <cstdint>
 #include <string>

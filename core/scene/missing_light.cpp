@@ -15,7 +15,7 @@ struct SingleDirections {
     bool scatters = false;  ///< Something else reflects light to all sides.
 };
 
-/// Below it a rough surface is taken for smooth: √CRT_ALPHA_MIN of kernel/microfacet.h.
+/// Below it a rough surface is taken for smooth: √CRT_ALPHA_MIN of kernel/materials/microfacet.h.
 constexpr double kSmooth = 0.0316;
 
 bool isSmooth(const Material& material) {

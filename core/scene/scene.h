@@ -4,7 +4,7 @@
 #pragma once
 
 #include "base/error.h"
-#include "kernel/features.h"
+#include "kernel/dialect/features.h"
 #include "scene/aov.h"
 #include "scene/ies_file.h"
 #include "scene/spectral_film.h"
@@ -112,7 +112,7 @@ inline constexpr int kDeepestComposition = 8;
 /// How deep the mixes are that an openpbr material becomes.
 inline constexpr int kDeepestOpenPbr = 3;
 
-/// The coat of OpenPBR Surface 1.1 (kernel/clearcoat.h), on what reflects alone.
+/// The coat of OpenPBR Surface 1.1 (kernel/materials/clearcoat.h), on what reflects alone.
 struct Clearcoat {
     double ior = 1.6;       ///< At least 1.
     double roughness = 0;   ///< In [0,1].
@@ -337,7 +337,7 @@ struct Scene {
     double parse_seconds = 0;
 };
 
-/// The channels of its film beside those of kernel/channels.h. Views show no spectrum.
+/// The channels of its film beside those of kernel/dialect/channels.h. Views show no spectrum.
 inline SpectralChannels spectralChannelsOf(const Scene& scene) {
     SpectralChannels channels;
     if (scene.integrator.type != IntegratorType::Path) return channels;

@@ -20,7 +20,7 @@ inline constexpr TextureIndex kNoTexture = -1;
 
 /// What the texels of an image are.
 enum class TexelKind {
-    Spectra,  ///< Reflectances: three words, the coefficients of a sigmoid (kernel/texture.h).
+    Spectra,  ///< Reflectances: three words, the coefficients of a sigmoid (kernel/values/texture.h).
     Numbers,  ///< In [0, 1]: one word, of 65535.
     Normals,  ///< Directions, each component in [−1, 1]: three words, 0 to 65535.
 };

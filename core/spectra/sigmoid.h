@@ -1,7 +1,7 @@
 /// Reflectances of three numbers. W. Jakob and J. Hanika, "A Low-Dimensional Function Space for Efficient
 /// Spectral Upsampling", Computer Graphics Forum 38(2), 2019: the sigmoid ½ + x / (2√(1 + x²)) of
 /// x = c₀ + c₁t + c₂t², t the wavelength as −1 (360 nm) to 1 (830 nm), is smooth and cannot leave
-/// (0, 1). The kernel evaluates it (crt_sigmoid in kernel/spectrum.h).
+/// (0, 1). The kernel evaluates it (crt_sigmoid in kernel/sampling/spectrum.h).
 #pragma once
 
 #include "spectra/spectra.h"

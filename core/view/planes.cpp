@@ -6,7 +6,7 @@
 #include "film/luminance_error.h"
 #include "film/resolve.h"
 #include "image/image_io.h"
-#include "kernel/layout.h"
+#include "kernel/dialect/layout.h"
 #include "scene/aov.h"
 #include "spectra/spectra.h"
 

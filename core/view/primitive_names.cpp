@@ -2,7 +2,7 @@
 
 #include "compile/instances.h"
 #include "compile/placements.h"
-#include "kernel/layout.h"
+#include "kernel/dialect/layout.h"
 
 #include <algorithm>
 

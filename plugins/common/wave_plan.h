@@ -1,12 +1,12 @@
-/// Which kernels the waves of a scene need, and who of them shades what (kernel/wavefront.h).
+/// Which kernels the waves of a scene need, and who of them shades what (kernel/schedule/wavefront.h).
 #pragma once
 
 #include "kernel_spec.h"
 
 #include "backend/sdk/launch_pacer.h"
-#include "kernel/features.h"
-#include "kernel/layout.h"
-#include "kernel/wavefront.h"
+#include "kernel/dialect/features.h"
+#include "kernel/dialect/layout.h"
+#include "kernel/schedule/wavefront.h"
 
 #include <algorithm>
 #include <cstdint>
@@ -68,7 +68,7 @@ inline std::uint64_t featuresOfMaterial(const void* blob, std::uint32_t number) 
 
 }  // namespace wave_plan
 
-/// `blob`: a compiled scene (kernel/layout.h).
+/// `blob`: a compiled scene (kernel/dialect/layout.h).
 inline WavePlan planWave(const void* blob) {
     using namespace kernel;
     using namespace wave_plan;

@@ -1,7 +1,7 @@
 #include "cuda_integrator.h"
 
 #include "backend/sdk/gpu_schedule.h"
-#include "kernel/features.h"
+#include "kernel/dialect/features.h"
 
 #include <algorithm>
 #include <chrono>

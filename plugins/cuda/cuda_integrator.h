@@ -11,7 +11,7 @@
 #include "backend/crt_backend.h"
 #include "backend/sdk/launch_pacer.h"
 #include "backend/sdk/plugin_guard.h"
-#include "kernel/layout.h"
+#include "kernel/dialect/layout.h"
 
 #include <cstdint>
 #include <memory>

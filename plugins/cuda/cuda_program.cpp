@@ -3,8 +3,8 @@
 #include "cuda_kernel_text.h"
 #include "cuda_precompiled.h"
 
-#include "kernel/bvh.h"
-#include "kernel/features.h"
+#include "kernel/dialect/features.h"
+#include "kernel/geometry/bvh.h"
 
 #include <algorithm>
 #include <chrono>
@@ -205,7 +205,7 @@ CudaProgram::CudaProgram(const plugin::Host& host, const Device& device, std::ve
     }
 
     lean_name_ = compiler->name() + " sm_" + std::to_string(device.arch);
-    const std::string text = kernelText(host_.kernelSource("wavefront.h"));
+    const std::string text = kernelText(host_.kernelSource("kernel/schedule/wavefront.h"));
     takeFromCache(text, *compiler, device);
     if (pending_.empty()) {
         from_cache_ = true;

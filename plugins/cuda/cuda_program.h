@@ -29,7 +29,7 @@ constexpr std::uint32_t kRayCounters = 1024;
 /// Whether it has the stacks of a tree's traversal.
 bool traverses(const KernelSpec& spec);
 
-/// The whole text that NVRTC compiles: the host's text of kernel/wavefront.h, then kernels.cu.
+/// The whole text that NVRTC compiles: the host's text of kernel/schedule/wavefront.h, then kernels.cu.
 std::string kernelText(const std::string& wavefront_text);
 
 /// How many blocks a multiprocessor should hold at once, in the order of trying: more hide latency better,

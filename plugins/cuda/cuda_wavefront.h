@@ -1,4 +1,4 @@
-/// Paths advanced by kernels of their own for tracing and for shading (kernel/wavefront.h).
+/// Paths advanced by kernels of their own for tracing and for shading (kernel/schedule/wavefront.h).
 #pragma once
 
 #include "cuda_device.h"
@@ -6,7 +6,7 @@
 
 #include "backend/sdk/launch_pacer.h"
 #include "common/wave_plan.h"
-#include "kernel/wavefront.h"
+#include "kernel/schedule/wavefront.h"
 
 #include <cstdint>
 #include <functional>

@@ -1,7 +1,7 @@
 /*
  * kernels.cu: the CUDA entry points. nvcc compiles this file ahead of time with everything in; while the
- * program runs, the host's text of kernel/wavefront.h stands above it, and NVRTC compiles what one scene
- * needs.
+ * program runs, the host's text of kernel/schedule/wavefront.h stands above it, and NVRTC compiles what one
+ * scene needs.
  *
  * crt_render: a thread renders one pixel over a range of samples. Where the image is too small to fill the
  * device, the range is split over `slices` rows of the grid: each adds to a film of its own, and
@@ -9,12 +9,12 @@
  * which block ran first.
  *
  * crt_trace, crt_choose_queue and crt_shade_queue: a thread takes one slot of a wave one vertex further
- * (kernel/wavefront.h). They are compiled one at a time, each with the features that it needs.
+ * (kernel/schedule/wavefront.h). They are compiled one at a time, each with the features that it needs.
  *
  * No thread waits for another: tests run these very functions as plain loops.
  */
 #ifndef CRT_WAVEFRONT_H
-#include "kernel/wavefront.h"
+#include "kernel/schedule/wavefront.h"
 #endif
 
 /* Which entry points this module has. */

@@ -2,7 +2,7 @@
 #include "cuda_integrator.h"
 
 #include "backend/sdk/plugin_guard.h"
-#include "kernel/features.h"
+#include "kernel/dialect/features.h"
 
 namespace {
 

@@ -1,6 +1,6 @@
 #include "embree_integrator.h"
 
-#include "kernel/features.h"
+#include "kernel/dialect/features.h"
 
 #include <algorithm>
 #include <atomic>

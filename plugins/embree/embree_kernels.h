@@ -22,4 +22,4 @@
 #define CRT_EMBREE_ALL_FEATURES CRT_FEATURES_ALL
 
 // Behind the masks: CRT_FEATURES, which it evaluates, is one of them.
-#include "kernel/features.h"
+#include "kernel/dialect/features.h"

@@ -7,7 +7,7 @@ class Tree;
 // The kernels of this backend carry the tree along, and trace with it (kernels.cpp).
 #define CRT_CONTEXT_EXTRA const crt::embree::Tree* tree;
 #define CRT_BACKEND_TRACE
-#include "kernel/surface.h"
+#include "kernel/geometry/surface.h"
 
 #include <cstdint>
 #include <functional>

@@ -3,7 +3,7 @@
 #include "embree_kernels.h"
 #include "embree_program.h"
 
-#include "kernel/path.h"
+#include "kernel/integrators/path.h"
 
 #include "traversal.h"
 

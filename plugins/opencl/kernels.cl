@@ -1,6 +1,6 @@
 /*
- * kernels.cl: the OpenCL entry points. The host's text of kernel/wavefront.h stands above this one when it
- * is compiled, each entry point by itself with the features that it needs.
+ * kernels.cl: the OpenCL entry points. The host's text of kernel/schedule/wavefront.h stands above this one
+ * when it is compiled, each entry point by itself with the features that it needs.
  *
  * CRT_GROUP_X and CRT_GROUP_Y are the sides of crt_render's work-group, fixed so that a binary is complete:
  * PoCL compiles a kernel for one group size.

@@ -1,8 +1,8 @@
 #include "opencl_integrator.h"
 
 #include "backend/sdk/gpu_schedule.h"
-#include "kernel/features.h"
-#include "kernel/layout.h"
+#include "kernel/dialect/features.h"
+#include "kernel/dialect/layout.h"
 
 #include <algorithm>
 #include <chrono>

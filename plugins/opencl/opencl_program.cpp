@@ -108,8 +108,8 @@ Program buildProgram(const plugin::Host& host, const Device& device, const Sessi
     Program built;
     built.spec = spec;
     const std::string options = buildOptions(device, spec);
-    const std::string text =
-        std::string(host.kernelSource("wavefront.h")) + "\n#line 1 \"kernels.cl\"\n" + kKernelText;
+    const std::string text = std::string(host.kernelSource("kernel/schedule/wavefront.h")) +
+                             "\n#line 1 \"kernels.cl\"\n" + kKernelText;
 
     Stopwatch cache_time;
     const KernelCache cache(host.cacheDirectory());

@@ -4,8 +4,8 @@
 
 #include "backend/sdk/launch_pacer.h"
 #include "backend/sdk/plugin_guard.h"
-#include "kernel/features.h"
-#include "kernel/layout.h"
+#include "kernel/dialect/features.h"
+#include "kernel/dialect/layout.h"
 
 #include <algorithm>
 #include <chrono>

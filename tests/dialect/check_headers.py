@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
 """Compiles every kernel header alone, in one of its languages, with everything in it and with nothing.
 
-    check_headers.py cxx|cuda|opencl COMPILER KERNEL_FOLDER
+    check_headers.py cxx|cuda|opencl COMPILER ROOMS
 
-Syntax and types only. A header that leans on another without including it, or that strays from the common
-subset of C++17, CUDA C++ and OpenCL C 1.2, fails here with its name. Exit code 77, which ctest shows as
-skipped, where the compiler is missing.
+Syntax and types only. ROOMS: the include roots of a build tree (cmake/Rooms.cmake); a header is compiled
+with those that its room sees. So a header that uses another without including it, that includes one of a
+later room, or that is not in the common subset of C++17, CUDA C++ and OpenCL C 1.2, fails here with its
+name. Exit code 77, which ctest shows as skipped, where the compiler is missing.
 """
 
 import pathlib
@@ -13,6 +14,9 @@ import shutil
 import subprocess
 import sys
 import tempfile
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "rooms"))
+import check_rooms  # noqa: E402
 
 SKIPPED = 77
 WARNINGS = ["-Wall", "-Wextra", "-Wshadow", "-Werror", "-Wno-unused-function"]
@@ -54,23 +58,27 @@ def main() -> int:
     if len(sys.argv) != 4 or sys.argv[1] not in LANGUAGES:
         print(__doc__, file=sys.stderr)
         return 2
-    language, compiler, folder = sys.argv[1], sys.argv[2], pathlib.Path(sys.argv[3])
+    language, compiler, roots = sys.argv[1], sys.argv[2], pathlib.Path(sys.argv[3])
     if not shutil.which(compiler):
         print(f"skipped: no compiler for {language} ('{compiler}')")
         return SKIPPED
     suffix, options = LANGUAGES[language]
-    headers = sorted(folder.glob("*.h"))
+    rooms = check_rooms.read_rooms()
+    headers = [(room, header) for room in rooms if room.startswith("kernel/")
+               for header in sorted((check_rooms.CORE / room).glob("*.h"))]
     if not headers:
-        print(f"no headers in {folder}", file=sys.stderr)
+        print("core/kernel has no headers", file=sys.stderr)
         return 1
     failed = []
     with tempfile.TemporaryDirectory() as scratch:
-        for header in headers:
+        for room, header in headers:
+            seen = [arg for folder in (room, *check_rooms.seen_from(rooms, room))
+                    for arg in ("-I", str(roots / check_rooms.target_of(folder)))]
             # Twice, so that a missing include guard shows.
             unit = pathlib.Path(scratch) / (header.stem + suffix)
-            unit.write_text(f'#include "kernel/{header.name}"\n#include "kernel/{header.name}"\n')
+            unit.write_text(f'#include "{room}/{header.name}"\n' * 2)
             for mask in ([], ["-DCRT_FEATURES=0ul"]):
-                command = [compiler, *options, *mask, "-I", str(folder.parent), str(unit)]
+                command = [compiler, *options, *mask, *seen, str(unit)]
                 result = subprocess.run(command, capture_output=True, text=True, check=False)
                 ok = result.returncode == 0
                 print(

@@ -2,7 +2,7 @@
 // plugin_guard.h would not let most of these happen.
 #include "backend/crt_backend.h"
 #include "backend/crt_layout_hash.h"
-#include "kernel/bits_version.h"
+#include "kernel/dialect/bits_version.h"
 
 #include <cstddef>
 #include <cstdio>

@@ -19,8 +19,8 @@
 #include "backend/sdk/plugin_guard.h"
 
 #include "fake_pattern.h"
-#include "kernel/features.h"
-#include "kernel/layout.h"
+#include "kernel/dialect/features.h"
+#include "kernel/dialect/layout.h"
 
 #include <chrono>
 #include <cstdlib>

@@ -5,7 +5,7 @@
 
 namespace crt::fake {
 
-/// Channels of the film, as in kernel/layout.h.
+/// Channels of the film, as in kernel/dialect/layout.h.
 enum Channel : std::uint32_t { kX = 0, kY = 1, kZ = 2, kYSquared = 3 };
 
 /// A multiple of 2^-24 in [0,1), different for every argument: sums of fewer than 2^29 of them are exact in

@@ -1,7 +1,7 @@
 // The example backend with a mistake in its physics: the light of lamps is not weighted by the cosine at
 // which it arrives on a diffuse surface. `crt verify` must fail it, and say so.
 #include "backend/sdk/plugin_guard.h"
-#include "kernel/light.h"
+#include "kernel/lights/light.h"
 
 namespace crt::kernel {
 inline vec4 crt_bsdf_without_cosine(const CrtBsdf* bsdf, vec3 wi, f32* pdf) {

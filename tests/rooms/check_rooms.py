@@ -6,10 +6,10 @@
     tests/rooms/check_rooms.py --draw           the picture of docs/architecture.md
     tests/rooms/check_rooms.py --write          puts that picture there
 
-What is checked: only CMakeLists.txt and rooms lie directly in core/; every source file of a room is in its
-target; every include of another room's header follows the arrows; no target links a room outside
-crt_room(); an include root holds the headers of its own room alone; docs/architecture.md has the picture
-that --draw makes. """
+What is checked: only CMakeLists.txt and rooms lie directly in core/; every header lies in a room; every
+source file of a room is in its target; every include of another room's header follows the arrows; no target
+links a room outside crt_room(); an include root holds the headers of its own room alone;
+docs/architecture.md has the picture that --draw makes. """
 
 import argparse
 import pathlib
@@ -55,8 +55,15 @@ class Room:
         return self.parts["USES"]
 
 
-def read_rooms(text):
+def target_of(folder):
+    """The CMake target of a room, and the name of its include root."""
+    return "crt_" + folder.replace("/", "_")
+
+
+def read_rooms(text=None):
     """Rooms in the order of the file, which is that of the data."""
+    if text is None:
+        text = (CORE / "CMakeLists.txt").read_text()
     rooms = {}
     for match in re.finditer(r"((?:^# .*\n)*)^crt_room\(([^)]*)\)", text, re.MULTILINE):
         comment = " ".join(line[2:] for line in match.group(1).splitlines())
@@ -91,6 +98,10 @@ def check_sources(rooms):
     for entry in sorted(CORE.iterdir()):
         if entry.is_file() and entry.name != "CMakeLists.txt":
             yield f"core/{entry.name} lies outside every room"
+    for file in sorted(CORE.rglob("*.h")):
+        folder = str(file.parent.relative_to(CORE))
+        if folder not in rooms and folder not in BESIDE and not folder.startswith("include/"):
+            yield f"core/{file.relative_to(CORE)} lies outside every room"
     for file in sorted(CORE.rglob("*.cpp")):
         name = str(file.relative_to(CORE))
         folder = str(pathlib.PurePosixPath(name).parent)
@@ -124,7 +135,7 @@ def check_includes(rooms):
 
 def check_links(rooms, text):
     """crt_room() is the only place where rooms are linked to rooms."""
-    targets = {"crt_" + folder.replace("/", "_"): folder for folder in rooms}
+    targets = {target_of(folder): folder for folder in rooms}
     for match in re.finditer(r"target_link_libraries\((\w+)([^)]*)\)", text):
         if match.group(1) not in targets:
             continue
@@ -135,7 +146,7 @@ def check_links(rooms, text):
 
 def check_roots(rooms, build):
     for folder in rooms:
-        root = build / "rooms" / ("crt_" + folder.replace("/", "_"))
+        root = build / "rooms" / target_of(folder)
         wanted = {str(h.relative_to(CORE)) for h in (CORE / folder).glob("*.h")} | set(
             rooms[folder].parts["HEADERS"]
         )

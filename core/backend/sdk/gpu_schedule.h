@@ -2,7 +2,7 @@
 /// core. Never changes the image.
 #pragma once
 
-#include "kernel/features.h"
+#include "kernel/dialect/features.h"
 
 #include <bit>
 #include <cstdint>
@@ -14,10 +14,10 @@ namespace crt {
 inline bool mayOutlastLaunch(std::uint32_t max_depth) { return max_depth > 1u << 16; }
 
 /// Whether tracing and shading should be kernels of their own, paths sorted by the kind of material that
-/// they have met (kernel/wavefront.h), rather than one kernel that takes each path to its end. Where there
-/// are several kinds, or one of many instructions, a warp otherwise runs the code of all of them for a few
-/// lanes each (docs/decisions/0042-wavefront.md, with what was measured). Paths without end are taken a
-/// vertex a launch, too.
+/// they have met (kernel/schedule/wavefront.h), rather than one kernel that takes each path to its end.
+/// Where there are several kinds, or one of many instructions, a warp otherwise runs the code of all of
+/// them for a few lanes each (docs/decisions/0042-wavefront.md, with what was measured). Paths without end
+/// are taken a vertex a launch, too.
 inline bool wantsWavefront(std::uint64_t features, std::uint32_t max_depth) {
     constexpr std::uint64_t kLong = CRT_FEATURE_ROUGH_CONDUCTOR | CRT_FEATURE_ROUGH_DIELECTRIC |
                                     CRT_FEATURE_PLASTIC | CRT_FEATURE_CLEARCOAT | CRT_FEATURE_FUZZ |

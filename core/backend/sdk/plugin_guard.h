@@ -28,8 +28,8 @@
 
 #include "backend/crt_backend.h"
 #include "backend/crt_layout_hash.h"
-#include "kernel/bits_version.h"
-#include "kernel/layout.h"
+#include "kernel/dialect/bits_version.h"
+#include "kernel/dialect/layout.h"
 
 #include <algorithm>
 #include <cfenv>
@@ -422,8 +422,8 @@ inline const CrtDevice& chooseDevice(const std::vector<CrtDevice>& devices, cons
 
 }  // namespace crt::plugin
 
-/// Defines the entry symbol of the library. `features` is the mask of kernel/features.h that the backend can
-/// run.
+/// Defines the entry symbol of the library. `features` is the mask of kernel/dialect/features.h that the
+/// backend can run.
 #define CRT_DEFINE_BACKEND(Integrator, list_devices, name, version, features) \
     CRT_DEFINE_BACKEND_BUILT_WITH(Integrator, list_devices, name, version, CRT_COMPILER_TEXT, features)
 

@@ -3,8 +3,8 @@
 #include "judge/verify/references.h"
 #include "judge/verify/scenes.h"
 
-#include "kernel/features.h"
-#include "kernel/sampler.h"
+#include "kernel/dialect/features.h"
+#include "kernel/sampling/sampler.h"
 
 #include <fmt/format.h>
 

@@ -4,7 +4,7 @@
 #include "judge/verify/shapes.h"
 #include "judge/verify/variants.h"
 
-#include "kernel/features.h"
+#include "kernel/dialect/features.h"
 
 #include <fmt/format.h>
 

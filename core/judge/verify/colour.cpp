@@ -5,7 +5,7 @@
 
 #include "compile/compile.h"
 #include "image/image_io.h"
-#include "kernel/features.h"
+#include "kernel/dialect/features.h"
 
 #include <fmt/format.h>
 

@@ -5,7 +5,7 @@
 #include "judge/verify/shapes.h"
 
 #include "base/temporary_folder.h"
-#include "kernel/features.h"
+#include "kernel/dialect/features.h"
 
 #include <fmt/format.h>
 

@@ -6,8 +6,8 @@
 #include "judge/verify/references.h"
 
 #include "base/log.h"
-#include "kernel/features.h"
-#include "kernel/layout.h"
+#include "kernel/dialect/features.h"
+#include "kernel/dialect/layout.h"
 
 #include <fmt/format.h>
 

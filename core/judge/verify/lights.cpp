@@ -6,7 +6,7 @@
 #include "judge/verify/scenes.h"
 
 #include "compile/distributions.h"
-#include "kernel/features.h"
+#include "kernel/dialect/features.h"
 
 #include <fmt/format.h>
 

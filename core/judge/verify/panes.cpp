@@ -4,7 +4,7 @@
 #include "judge/verify/scenes.h"
 
 #include "base/temporary_folder.h"
-#include "kernel/features.h"
+#include "kernel/dialect/features.h"
 
 #include <fmt/format.h>
 

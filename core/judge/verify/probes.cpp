@@ -1,7 +1,7 @@
 #include "judge/verify/probes.h"
 
 #include "compile/compile.h"
-#include "kernel/path.h"
+#include "kernel/integrators/path.h"
 
 #include <fmt/format.h>
 

@@ -2,8 +2,8 @@
 // is known by topology or by arithmetic in double.
 #include "judge/verify/probes.h"
 
-#include "kernel/features.h"
-#include "kernel/layout.h"
+#include "kernel/dialect/features.h"
+#include "kernel/dialect/layout.h"
 
 #include <fmt/format.h>
 

@@ -5,8 +5,8 @@
 #include "judge/verify/variants.h"
 
 #include "base/temporary_folder.h"
-#include "kernel/features.h"
-#include "kernel/layout.h"
+#include "kernel/dialect/features.h"
+#include "kernel/dialect/layout.h"
 
 #include <fmt/format.h>
 

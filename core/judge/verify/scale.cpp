@@ -8,7 +8,7 @@
 
 #include "base/log.h"
 #include "compile/compile.h"
-#include "kernel/features.h"
+#include "kernel/dialect/features.h"
 
 #include <fmt/format.h>
 

@@ -3,8 +3,8 @@
 #include "judge/verify/references.h"
 #include "judge/verify/scenes.h"
 
-#include "kernel/bsdf.h"
-#include "kernel/features.h"
+#include "kernel/dialect/features.h"
+#include "kernel/materials/bsdf.h"
 
 #include <fmt/format.h>
 

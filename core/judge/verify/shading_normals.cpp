@@ -6,7 +6,7 @@
 #include "judge/verify/scenes.h"
 #include "judge/verify/shapes.h"
 
-#include "kernel/features.h"
+#include "kernel/dialect/features.h"
 
 #include <fmt/format.h>
 

@@ -2,7 +2,7 @@
 #include "judge/verify/context.h"
 #include "judge/verify/scenes.h"
 
-#include "kernel/features.h"
+#include "kernel/dialect/features.h"
 
 #include <fmt/format.h>
 

@@ -5,7 +5,7 @@
 #include "judge/verify/scenes.h"
 
 #include "film/error_estimate.h"
-#include "kernel/features.h"
+#include "kernel/dialect/features.h"
 
 #include <fmt/format.h>
 

@@ -4,8 +4,8 @@
 #include "judge/verify/references.h"
 #include "judge/verify/scenes.h"
 
-#include "kernel/bsdf.h"
-#include "kernel/features.h"
+#include "kernel/dialect/features.h"
+#include "kernel/materials/bsdf.h"
 #include "spectra/spectra.h"
 
 #include <fmt/format.h>

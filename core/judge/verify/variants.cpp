@@ -1,7 +1,7 @@
 #include "judge/verify/variants.h"
 
 #include "judge/verify/shapes.h"
-#include "kernel/path.h"
+#include "kernel/integrators/path.h"
 
 #include <memory>
 #include <span>

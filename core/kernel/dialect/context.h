@@ -1,0 +1,24 @@
+/*
+ * context.h: what every function that reads the scene gets as its first argument.
+ */
+#ifndef CRT_CONTEXT_H
+#define CRT_CONTEXT_H
+
+#include "kernel/dialect/layout.h"
+
+CRT_KERNEL_BEGIN
+
+/* The scene as a kernel sees it: the blob and its header. A backend may carry its own handle along
+ * (CRT_CONTEXT_EXTRA). */
+#ifndef CRT_CONTEXT_EXTRA
+#define CRT_CONTEXT_EXTRA
+#endif
+typedef struct CrtContext {
+    CRT_GLOBAL const CRT_BYTE *blob;
+    CRT_GLOBAL const CrtScene *scene;
+    CRT_CONTEXT_EXTRA
+} CrtContext;
+
+CRT_KERNEL_END
+
+#endif

@@ -1,0 +1,122 @@
+/*
+ * environment_image.h: an image around the scene. Its texels are even in radiance. Light sampling chooses
+ * one by its radiance times its solid angle, a row and then a column, and a direction within it; rays that
+ * meet nothing ask for the density of theirs.
+ */
+#ifndef CRT_ENVIRONMENT_IMAGE_H
+#define CRT_ENVIRONMENT_IMAGE_H
+
+#include "kernel/sampling/sampler.h"
+#include "kernel/values/value.h"
+
+CRT_KERNEL_BEGIN
+
+CRT_FN CRT_GLOBAL const CrtEnvironmentImage *crt_environment_image(const CrtContext *ctx) {
+    return CRT_ARRAY(CrtEnvironmentImage, ctx->blob, ctx->scene->environment_image);
+}
+
+/* Where a direction lies in the image. */
+typedef struct CrtEnvironmentPlace {
+    u32 row, column;
+    f32 sine; /* of its angle with the image's axis */
+} CrtEnvironmentPlace;
+
+/* Of an environment without an image. */
+CRT_FN CrtEnvironmentPlace crt_no_place(void) {
+    CrtEnvironmentPlace place;
+    place.row = place.column = 0u;
+    place.sine = 0.0f;
+    return place;
+}
+
+CRT_FN CrtEnvironmentPlace crt_environment_place(CRT_GLOBAL const CrtEnvironmentImage *image, vec3 d) {
+    CrtEnvironmentPlace place;
+    const f32 right = dot3(crt_load3(image->right), d);
+    const f32 up = dot3(crt_load3(image->up), d);
+    const f32 ahead = dot3(crt_load3(image->ahead), d);
+    place.sine = crt_sqrt(right * right + ahead * ahead);
+    const f32 row = crt_atan2(place.sine, up) * CRT_INV_PI * (f32)image->height;
+    const f32 column = (crt_atan2(right, ahead) * (0.5f * CRT_INV_PI) + 0.5f) * (f32)image->width;
+    /* Rounding may lead one beyond the last. */
+    const u32 r = (u32)row;
+    const u32 c = (u32)column;
+    place.row = r < image->height ? r : image->height - 1u;
+    place.column = c < image->width ? c : image->width - 1u;
+    return place;
+}
+
+/* Last of the `count` items whose first number is at most u; `first` holds those numbers, ascending. */
+CRT_FN u32 crt_chosen(CRT_GLOBAL const u32 *first, u32 count, u32 u) {
+    u32 index = 0u;
+    u32 end = count;
+    while (end - index > 1u) {
+        const u32 middle = (index + end) >> 1;
+        if (first[middle] <= u) index = middle;
+        else end = middle;
+    }
+    return index;
+}
+
+/* How many of 2^32 numbers choose an item: less than all, since each item has one. */
+CRT_FN f32 crt_share(CRT_GLOBAL const u32 *first, u32 count, u32 index) {
+    const u32 end = index + 1u < count ? first[index + 1u] : 0u;
+    return (f32)(end - first[index]);
+}
+
+CRT_FN CRT_GLOBAL const u32 *crt_environment_columns(const CrtContext *ctx,
+                                                     CRT_GLOBAL const CrtEnvironmentImage *image, u32 row) {
+    return CRT_ARRAY(u32, ctx->blob, image->columns) + (u64)row * image->width;
+}
+
+/* pdf of a direction at `place`, given that the environment is sampled: the texel's probability over its
+   extent, 2π² sin θ / (rows · columns) for a direction at θ. */
+CRT_FN f32 crt_environment_density(const CrtContext *ctx, CrtEnvironmentPlace place) {
+    CRT_GLOBAL const CrtEnvironmentImage *image = crt_environment_image(ctx);
+    const f32 scale = 2.3283064365386963e-10f; /* 2^-32 */
+    const f32 row =
+        crt_share(CRT_ARRAY(u32, ctx->blob, image->rows), image->height, place.row) * scale;
+    const f32 column =
+        crt_share(crt_environment_columns(ctx, image, place.row), image->width, place.column) * scale;
+    const f32 extent = 2.0f * CRT_PI * CRT_PI * crt_max(place.sine, 1e-12f);
+    return row * column * ((f32)image->width * (f32)image->height) / extent;
+}
+
+/* A direction of the image, and its texel: near an edge, where rounding would look its neighbour up, the one
+   that was chosen. */
+CRT_FN vec3 crt_environment_direction(const CrtContext *ctx, CrtRandom2 u, CrtEnvironmentPlace *place) {
+    CRT_GLOBAL const CrtEnvironmentImage *image = crt_environment_image(ctx);
+    CRT_GLOBAL const u32 *rows = CRT_ARRAY(u32, ctx->blob, image->rows);
+    const u32 u_row = (u32)(u.y * 4294967296.0f);
+    const u32 u_column = (u32)(u.x * 4294967296.0f);
+    const u32 row = crt_chosen(rows, image->height, u_row);
+    CRT_GLOBAL const u32 *columns = crt_environment_columns(ctx, image, row);
+    const u32 column = crt_chosen(columns, image->width, u_column);
+    /* What is left of the numbers says where in the texel. */
+    const f32 in_row = (f32)(u_row - rows[row]) / crt_share(rows, image->height, row);
+    const f32 in_column = (f32)(u_column - columns[column]) / crt_share(columns, image->width, column);
+    const f32 theta = ((f32)row + in_row) * (CRT_PI / (f32)image->height);
+    const f32 phi = ((f32)column + in_column) * (2.0f * CRT_PI / (f32)image->width) - CRT_PI;
+    f32 cos_theta, cos_phi;
+    const f32 sin_theta = crt_sincos(theta, &cos_theta);
+    const f32 sin_phi = crt_sincos(phi, &cos_phi);
+    const vec3 d = crt_fma3(crt_load3(image->right), sin_theta * sin_phi,
+                            crt_fma3(crt_load3(image->up), cos_theta,
+                                     crt_load3(image->ahead) * (sin_theta * cos_phi)));
+    place->row = row;
+    place->column = column;
+    place->sine = sin_theta;
+    return normalize3(d);
+}
+
+/* Radiance of a texel. */
+CRT_FN vec4 crt_environment_texel(const CrtContext *ctx, CrtEnvironmentPlace place, vec4 position) {
+    CRT_GLOBAL const CrtEnvironmentImage *image = crt_environment_image(ctx);
+    CRT_GLOBAL const CrtEnvironmentTexel *texel = CRT_ARRAY(CrtEnvironmentTexel, ctx->blob, image->texels) +
+                                                  ((u64)place.row * image->width + place.column);
+    return crt_sigmoid(texel->c0, texel->c1, texel->c2, position) * texel->scale *
+           crt_value(ctx, ctx->scene->environment, 0, position);
+}
+
+CRT_KERNEL_END
+
+#endif

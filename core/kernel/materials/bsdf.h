@@ -1,0 +1,250 @@
+/*
+ * bsdf.h: how surfaces scatter. crt_bsdf_prepare reads what a material is made of, once a vertex; then
+ * crt_bsdf_sample, crt_bsdf and the flags are all that layers.h and path.h know. A material is a
+ * row of CRT_MATERIAL_LIST (features.h) and a case in each of the three; deltas, which can only be sampled,
+ * need none in crt_bsdf.
+ */
+#ifndef CRT_BSDF_H
+#define CRT_BSDF_H
+
+#include "kernel/materials/pane.h"
+#include "kernel/materials/plastic.h"
+
+CRT_KERNEL_BEGIN
+
+/* A material's type; known without looking where the kernel has only one. */
+#define CRT_ONLY_MATERIAL(F, bit, NAME, Name, word, scatter, text) \
+    if (only == 1ul << bit) return bit;
+CRT_FN u32 crt_material_type(u32 type) {
+    const u64 only = CRT_KERNEL_MATERIALS;
+    CRT_MATERIAL_LIST(CRT_ONLY_MATERIAL, )
+    return type;
+}
+
+/* What the material of `surface` does to light that leaves along wo. `carried`: the path's throughput, which
+   the choice between wavelengths goes by. The first vertex asks for the albedo. */
+CRT_FN void crt_bsdf_prepare(const CrtContext *ctx, CrtBsdf *b, const CrtSurface *surface, vec3 wo,
+                             vec4 position, vec4 carried, int albedo) {
+    const CrtMaterial material = CRT_ARRAY(CrtMaterial, ctx->blob, ctx->scene->materials)[surface->material];
+    const int outside = dot3(wo, surface->ng) > 0.0f;
+    b->type = crt_material_type(material.type);
+    b->flags = 0u;
+    b->wo = wo;
+    b->ng = outside ? surface->ng : -surface->ng;
+    b->ns = outside ? surface->ns : -surface->ns;
+    if (CRT_HAS(SMOOTH_NORMALS) || CRT_HAS(NORMAL_MAP)) {
+        crt_face_viewer(b, (material.flags & CRT_MATERIAL_TRANSMITS) != 0u);
+        wo = b->wo;
+    }
+    b->albedo = splat4(1.0f);
+    switch (b->type) {
+        case CRT_MATERIAL_DIFFUSE:
+            if (CRT_HAS(DIFFUSE)) {
+                b->flags = CRT_BSDF_REFLECTS;
+                b->reflectance = crt_value(ctx, material.reflectance, surface, position);
+                if (albedo) b->albedo = b->reflectance;
+            }
+            break;
+        case CRT_MATERIAL_MIRROR:
+            if (CRT_HAS(MIRROR)) {
+                b->flags = CRT_BSDF_REFLECTS | CRT_BSDF_DELTA;
+                b->reflectance = crt_value(ctx, material.reflectance, surface, position);
+                if (albedo) b->albedo = b->reflectance;
+            }
+            break;
+        case CRT_MATERIAL_CONDUCTOR:
+            if (CRT_HAS(CONDUCTOR)) {
+                b->eta = crt_value(ctx, material.eta, surface, position);
+                b->k = crt_value(ctx, material.k, surface, position);
+                b->flags = CRT_BSDF_REFLECTS | CRT_BSDF_DELTA;
+                if (CRT_HAS(THIN_FILM)) crt_prepare_film(ctx, b, &material, surface, position, splat4(1.0f));
+                b->reflectance = crt_metal_reflectance(b, crt_min(dot3(wo, b->ns), 1.0f));
+                if (albedo) b->albedo = crt_metal_reflectance(b, 1.0f);
+            }
+            break;
+        case CRT_MATERIAL_ROUGH_CONDUCTOR:
+            if (CRT_HAS(ROUGH_CONDUCTOR)) {
+                const f32 roughness = V4X(crt_value(ctx, material.roughness, surface, position));
+                b->flags = CRT_BSDF_REFLECTS;
+                b->eta = crt_value(ctx, material.eta, surface, position);
+                b->k = crt_value(ctx, material.k, surface, position);
+                b->alpha = roughness * roughness;
+                if (CRT_HAS(ANISOTROPY)) crt_prepare_anisotropy(ctx, b, &material, surface, outside);
+                if ((material.flags & CRT_MATERIAL_OPENPBR) != 0u)
+                    crt_prepare_colors(b, V4X(crt_value(ctx, material.coat, surface, position)));
+                if (CRT_HAS(THIN_FILM)) crt_prepare_film(ctx, b, &material, surface, position, splat4(1.0f));
+                if (b->alpha >= CRT_ALPHA_MIN) {
+                    b->losses = crt_losses(ctx, material.loss, roughness, splat4(0.0f), 0u);
+                    crt_prepare_metal_loss(b, crt_has_film(b)     ? crt_film_mean(b)
+                                              : crt_is_colored(b) ? crt_colored_mean(b)
+                                                                  : crt_value(ctx, material.reflectance,
+                                                                              surface, position));
+                } else {
+                    b->flags |= CRT_BSDF_DELTA;
+                    b->reflectance = crt_metal_reflectance(b, crt_min(dot3(wo, b->ns), 1.0f));
+                }
+                if (albedo) b->albedo = crt_metal_reflectance(b, 1.0f);
+            }
+            break;
+        case CRT_MATERIAL_DIELECTRIC:
+            if (CRT_HAS(DIELECTRIC)) {
+                const vec4 eta = crt_value(ctx, material.eta, surface, position);
+                b->flags = CRT_BSDF_REFLECTS | CRT_BSDF_TRANSMITS | CRT_BSDF_DELTA | CRT_BSDF_BOUNDS;
+                if ((material.flags & CRT_MATERIAL_DISPERSIVE) != 0u) b->flags |= CRT_BSDF_DISPERSIVE;
+                b->eta = outside ? eta : splat4(1.0f) / eta;
+                if (CRT_HAS(THIN_FILM)) {
+                    b->k = splat4(0.0f);
+                    b->lanes = carried / sum4(carried);
+                    crt_prepare_film(ctx, b, &material, surface, position, outside ? splat4(1.0f) : eta);
+                }
+            }
+            break;
+        case CRT_MATERIAL_ROUGH_DIELECTRIC:
+            if (CRT_HAS(ROUGH_DIELECTRIC)) {
+                const f32 roughness = V4X(crt_value(ctx, material.roughness, surface, position));
+                const vec4 eta = crt_value(ctx, material.eta, surface, position);
+                b->flags = CRT_BSDF_REFLECTS | CRT_BSDF_TRANSMITS | CRT_BSDF_BOUNDS;
+                if ((material.flags & CRT_MATERIAL_DISPERSIVE) != 0u) b->flags |= CRT_BSDF_DISPERSIVE;
+                b->eta = outside ? eta : splat4(1.0f) / eta;
+                b->alpha = roughness * roughness;
+                if (CRT_HAS(ANISOTROPY)) crt_prepare_anisotropy(ctx, b, &material, surface, outside);
+                b->lanes = carried / sum4(carried);
+                if (CRT_HAS(THIN_FILM)) {
+                    b->k = splat4(0.0f);
+                    crt_prepare_film(ctx, b, &material, surface, position, outside ? splat4(1.0f) : eta);
+                }
+                if (crt_is_rough(b->alpha, eta)) {
+                    b->flags |= CRT_BSDF_CHOOSES;
+                    b->losses = crt_losses(ctx, material.loss, roughness, crt_has_film(b) ? position : eta,
+                                           outside ? 0u : 1u);
+                    crt_prepare_glass_loss(b);
+                } else {
+                    b->flags |= CRT_BSDF_DELTA;
+                }
+            }
+            break;
+        case CRT_MATERIAL_THIN_DIELECTRIC:
+            if (CRT_HAS(THIN_DIELECTRIC)) {
+                /* What passes is no vertex (passing.h). */
+                b->flags = CRT_BSDF_REFLECTS | CRT_BSDF_DELTA;
+                crt_prepare_pane(ctx, b, &material, surface, position);
+                b->reflectance = splat4(1.0f) - crt_pane_transmittance(b, b->pane_cosine);
+            }
+            break;
+        case CRT_MATERIAL_PLASTIC:
+            if (CRT_HAS(PLASTIC)) {
+                const vec4 base = crt_value(ctx, material.reflectance, surface, position);
+                const f32 roughness = V4X(crt_value(ctx, material.roughness, surface, position));
+                const f32 eta = V4X(crt_value(ctx, material.eta, surface, position));
+                const f32 k = V4X(crt_value(ctx, material.k, surface, position));
+                b->flags = CRT_BSDF_REFLECTS | CRT_BSDF_CHOOSES;
+                b->eta = splat4(eta);
+                b->alpha = roughness * roughness;
+                b->coat = 0;
+                if (CRT_HAS(TABLE) && (material.coat & CRT_VALUE_REFERENCE) != 0u)
+                    b->coat = CRT_ARRAY(f32, ctx->blob, ctx->scene->spectra) +
+                              (material.coat & CRT_VALUE_INDEX) * CRT_SPECTRUM_STRIDE;
+                /* Of what enters, the base sends this much back through the coat. */
+                vec4 returned = base * (1.0f - k) / (splat4(1.0f) - base * k);
+                if ((material.flags & CRT_MATERIAL_OPENPBR) != 0u) returned = base;
+                const f32 mirrored = crt_coat_albedo(b, dot3(wo, b->ns));
+                const f32 scattered = 0.25f * sum4(returned) * (1.0f - mirrored);
+                b->reflectance = returned * ((1.0f - mirrored) / ((1.0f - k) * eta * eta));
+                if (CRT_HAS(ROUGH_BASE))
+                    returned = crt_prepare_rough_base(ctx, b, surface->material, returned,
+                                                      (1.0f - k) * eta * eta);
+                b->coat_chance = mirrored > 0.0f ? mirrored / (mirrored + scattered) : 0.0f;
+                if (albedo) {
+                    const f32 facing = crt_coat_albedo(b, 1.0f);
+                    b->albedo = splat4(facing) + returned * (1.0f - facing);
+                }
+            }
+            break;
+        default: break;
+    }
+}
+
+/* Smooth dielectric, with or without a film. */
+CRT_FN CrtScatter crt_sample_smooth(const CrtBsdf *b, vec4 hero, int alone, f32 u) {
+    if (crt_has_film(b)) return crt_to_its_side(b, crt_sample_filmed_dielectric(b, hero, alone, u));
+    return crt_to_its_side(b, crt_sample_dielectric(b->eta, b->wo, b->ns, hero,
+                                                    (b->flags & CRT_BSDF_DISPERSIVE) != 0u, alone, u));
+}
+
+/* A direction w_i, distributed as the density of crt_bsdf or a delta. `choice`: two more random numbers,
+   where the flags ask for them. `hero`: 1 in the hero's lane, 0 elsewhere. `alone`: only the hero is
+   alive. */
+CRT_FN CrtScatter crt_bsdf_sample(const CrtBsdf *b, CrtRandom2 u, CrtRandom2 choice, vec4 hero, int alone) {
+    (void)choice;
+    switch (b->type) {
+        case CRT_MATERIAL_DIFFUSE:
+            if (CRT_HAS(DIFFUSE)) return crt_sample_lambert(b, u);
+            break;
+        case CRT_MATERIAL_MIRROR:
+        case CRT_MATERIAL_CONDUCTOR:
+            if (CRT_HAS(MIRROR) || CRT_HAS(CONDUCTOR)) return crt_sample_mirror_up(b, b->reflectance);
+            break;
+        case CRT_MATERIAL_ROUGH_CONDUCTOR:
+            if (CRT_HAS(ROUGH_CONDUCTOR)) {
+                if ((b->flags & CRT_BSDF_DELTA) != 0u) return crt_sample_mirror_up(b, b->reflectance);
+                CrtBsdf about = *b;
+                about.ng = crt_sampled_about(b);
+                return crt_turned_up(b, crt_sample_rough_conductor(&about, u));
+            }
+            break;
+        case CRT_MATERIAL_DIELECTRIC:
+            if (CRT_HAS(DIELECTRIC)) return crt_sample_smooth(b, hero, alone, u.x);
+            break;
+        case CRT_MATERIAL_ROUGH_DIELECTRIC:
+            if (CRT_HAS(ROUGH_DIELECTRIC)) {
+                if ((b->flags & CRT_BSDF_DELTA) == 0u)
+                    return crt_to_its_side(b, crt_sample_rough_dielectric(b, u, choice));
+                return crt_sample_smooth(b, hero, alone, u.x);
+            }
+            break;
+        case CRT_MATERIAL_THIN_DIELECTRIC:
+            if (CRT_HAS(THIN_DIELECTRIC))
+                return crt_to_its_side(b, crt_sample_mirror(b->reflectance, b->wo, b->ns, b->ns));
+            break;
+        case CRT_MATERIAL_PLASTIC:
+            if (CRT_HAS(PLASTIC)) return crt_sample_plastic(b, u, choice.x);
+            break;
+        default: break;
+    }
+    return crt_no_scatter();
+}
+
+/* f(w_o, w_i)·|cos w_i|, and the density per steradian with which crt_bsdf_sample finds w_i; both 0 for
+   deltas. */
+CRT_FN vec4 crt_bsdf(const CrtBsdf *b, vec3 wi, f32 *pdf) {
+    *pdf = 0.0f;
+    switch (b->type) {
+        case CRT_MATERIAL_DIFFUSE:
+            if (CRT_HAS(DIFFUSE)) {
+                const f32 lambert = crt_lambert_pdf(b, wi);
+                *pdf = lambert;
+                return b->reflectance * lambert;
+            }
+            break;
+        case CRT_MATERIAL_ROUGH_CONDUCTOR:
+            if (CRT_HAS(ROUGH_CONDUCTOR) && (b->flags & CRT_BSDF_DELTA) == 0u)
+                return crt_rough_conductor(b, wi, pdf);
+            break;
+        case CRT_MATERIAL_ROUGH_DIELECTRIC:
+            if (CRT_HAS(ROUGH_DIELECTRIC) && (b->flags & CRT_BSDF_DELTA) == 0u) {
+                /* What crt_to_its_side mirrors is not of the lobe. */
+                if ((CRT_HAS(SMOOTH_NORMALS) || CRT_HAS(NORMAL_MAP)) && !crt_keeps_side(b, wi)) break;
+                return crt_rough_dielectric(b, wi, pdf);
+            }
+            break;
+        case CRT_MATERIAL_PLASTIC:
+            if (CRT_HAS(PLASTIC)) return crt_plastic(b, wi, pdf);
+            break;
+        default: break;
+    }
+    return splat4(0.0f);
+}
+
+CRT_KERNEL_END
+
+#endif

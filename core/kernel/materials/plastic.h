@@ -1,0 +1,86 @@
+/*
+ * plastic.h: a diffuse base under a clear coat, smooth or rough. What the coat reflects is E(θ); the rest
+ * enters, is scattered by the base as Lambert's law says, and leaves, but for what the coat sends back from
+ * below, to be scattered again:
+ *
+ *     f = f_coat + a/π (1 − E(θ_o)) (1 − E(θ_i)) / (η² (1 − a k)),    k = 1 − (1 − Ē)/η²
+ *
+ * with a the base's albedo, Ē the mean of E over the cosine and k the share of diffuse light that the coat
+ * sends back from below, which (1 − k) η² = 1 − Ē ties to what it lets in. It is Mitsuba's
+ * `roughplastic` with `nonlinear` (Jakob et al. 2022), whose tables of transmittance are here E of
+ * microfacets that mirror once: what they lose enters. It is reciprocal, and a white base sends all light
+ * back.
+ */
+#ifndef CRT_PLASTIC_H
+#define CRT_PLASTIC_H
+
+#include "kernel/materials/microfacet.h"
+#include "kernel/materials/rough_base.h"
+#include "kernel/materials/shading_normal.h"
+
+CRT_KERNEL_BEGIN
+
+/* E(θ) of a rough coat, tabulated by the compiler of the scene at cosines in steps of 1/CRT_COAT_STEPS; of
+   a smooth one, Fresnel's. */
+CRT_FN f32 crt_coat_albedo(const CrtBsdf *b, f32 cosine) {
+    const f32 c = crt_min(cosine, 1.0f);
+    if (CRT_HAS(TABLE) && b->coat != 0) return crt_lookup(b->coat, c * CRT_COAT_STEPS);
+    return crt_fresnel_dielectric(c, V4X(b->eta));
+}
+
+/* f·|cos| without what a smooth coat mirrors, and its density. About an interpolated normal, what the base
+   sends below the surface is raised (shading_normal.h). */
+CRT_FN vec4 crt_plastic(const CrtBsdf *b, vec3 wi, f32 *pdf) {
+    const f32 cos_i = dot3(wi, b->ns);
+    const f32 below = crt_below(b);
+    f32 lambert = crt_lambert(cos_i);
+    f32 entering = cos_i > 0.0f ? (1.0f - crt_coat_albedo(b, cos_i)) * lambert : 0.0f;
+    vec4 rough = splat4(0.0f);
+    if (crt_has_rough_base(b) && cos_i > 0.0f) rough = crt_rough_base(b, wi, cos_i) * entering;
+    if (below > 0.0f) {
+        const f32 cos_g = dot3(wi, b->ng);
+        const f32 raised = below * crt_lambert(cos_g);
+        lambert = cos_g > 0.0f ? lambert + raised : 0.0f;
+        const f32 direct = entering;
+        entering = cos_g > 0.0f ? entering + (1.0f - crt_coat_albedo(b, crt_cosine_before(below, cos_i,
+                                                                                        cos_g))) * raised
+                                : 0.0f;
+        if (crt_has_rough_base(b)) {
+            const f32 before = crt_cosine_before(below, cos_i, cos_g);
+            const vec4 shape = crt_rough_base(b, crt_before_raised(b, below, wi, before), before);
+            rough = cos_g > 0.0f ? rough + shape * (entering - direct) : splat4(0.0f);
+        }
+    }
+    const vec4 base = crt_has_rough_base(b) ? rough : b->reflectance * entering;
+    *pdf = (1.0f - b->coat_chance) * lambert;
+    if (!(CRT_HAS(TABLE) && b->coat != 0) || !(cos_i > 0.0f)) return base;
+    const CrtMicrofacet m = crt_microfacet(b, wi);
+    if (!(m.cos_o > 0.0f)) return base;
+    *pdf += b->coat_chance * m.density / (2.0f * (m.cos_o + m.root_o));
+    return base + splat4(crt_fresnel_dielectric(m.cos_m, V4X(b->eta)) * m.density * m.cos_i /
+                         (2.0f * (m.root_o * m.cos_i + m.root_i * m.cos_o)));
+}
+
+/* `choice`: of coat and base. What a smooth coat mirrors has the density 0 of a delta; the rest, that of the
+   base alone, which light sampling competes with. */
+CRT_FN CrtScatter crt_sample_plastic(const CrtBsdf *b, CrtRandom2 u, f32 choice) {
+    CrtScatter s = crt_no_scatter();
+    if (choice < b->coat_chance) {
+        if (!(CRT_HAS(TABLE) && b->coat != 0))
+            return crt_sample_mirror_up(b,
+                                        splat4(crt_coat_albedo(b, dot3(b->wo, b->ns)) / b->coat_chance));
+        s.wi = normalize3(crt_reflect(b->wo, crt_visible_normal(b, u)));
+        s.valid = dot3(s.wi, b->ns) > 0.0f;
+    } else {
+        s.wi = crt_raised(b, crt_cosine_direction(b->ns, u));
+        s.valid = dot3(s.wi, b->ng) > 0.0f;
+    }
+    const vec4 value = crt_plastic(b, s.wi, &s.pdf);
+    s.valid = s.valid && s.pdf > 0.0f;
+    if (s.valid) s.weight = value / s.pdf;
+    return crt_turned_up(b, s);
+}
+
+CRT_KERNEL_END
+
+#endif

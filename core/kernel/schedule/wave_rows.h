@@ -1,0 +1,269 @@
+/*
+ * wave_rows.h: where a path lies between the kernels of a wave (wavefront.h). A slot takes a share of one
+ * pixel's samples, one after another. Its path lies in rows of 16 bytes, a row of all slots after another,
+ * so that neighbouring threads read neighbouring places.
+ */
+#ifndef CRT_WAVE_ROWS_H
+#define CRT_WAVE_ROWS_H
+
+#include "kernel/integrators/path.h"
+
+CRT_KERNEL_BEGIN
+
+#define CRT_WAVE_BLOCK 128u /* slots of 16 × 8 pixels, as warps of 8 × 4 */
+#define CRT_WAVE_BLOCK_WIDTH 16u
+#define CRT_WAVE_BLOCK_HEIGHT 8u
+#define CRT_WAVE_QUEUES 16u /* at most: one a kind of material, one of misses, one of choices */
+
+/* State of a slot. None: its path goes on from a vertex. */
+#define CRT_WAVE_DONE 1u  /* its samples are taken, or it has none */
+#define CRT_WAVE_ENDED 2u /* its path has ended */
+#define CRT_WAVE_ASKED 4u /* a shadow ray waits for its answer */
+#define CRT_WAVE_PASSED 8u /* the ray that it waits for goes on behind a surface that it has passed */
+#define CRT_WAVE_LAST 16u /* behind the surface that its shadow ray meets there is no other */
+
+/* Rows. */
+#define CRT_ROW_ORIGIN 0u       /* of the ray; depth, hero wavelength and `alone` */
+#define CRT_ROW_DIRECTION 1u    /* of the ray; state of xorshift */
+#define CRT_ROW_THROUGHPUT 2u
+#define CRT_ROW_RADIANCE 3u
+#define CRT_ROW_WAVELENGTHS 4u  /* positions */
+#define CRT_ROW_POINT 5u        /* where it was scattered; with which density */
+#define CRT_ROW_REST 6u         /* scatter_cosine, eta_square, the wavelengths' number, media */
+#define CRT_ROW_HIT 7u          /* t, b1, b2, slot of the scene */
+#define CRT_ROW_HIT_IDS 8u      /* primitive, instance, material of a mix */
+#define CRT_ROW_SHADOW_ORIGIN 9u /* and reach */
+#define CRT_ROW_SHADOW_DIRECTION 10u /* and the media around it */
+#define CRT_ROW_SHADOW_RADIANCE 11u
+#define CRT_ROW_SIDE 12u        /* where there is a tree of lights, or where there are AOVs, too: */
+#define CRT_ROW_ALBEDO 13u      /* first hit: */
+#define CRT_ROW_NORMAL 14u      /* and depth */
+#define CRT_ROW_PRIMITIVE 15u
+/* Where there are panes: the origin of a path's ray behind what it has passed, or the first direction of a
+   shadow ray; and how many surfaces it has passed. */
+#define CRT_ROW_PASSED 16u
+
+/* Rows that a scene's slots have. */
+#define CRT_WAVE_ROWS(features)                     \
+    (((features) & CRT_FEATURE_THIN_DIELECTRIC) ? 17u \
+     : ((features) & CRT_FEATURE_AOV)          ? 16u \
+     : ((features) & CRT_FEATURE_LIGHT_TREE)   ? 13u \
+                                               : 12u)
+
+/* A launch: samples [first_sample, first_sample + sample_count) of the pixels [x0, x1) × [y0, y1), and
+   where its slots are kept. */
+typedef struct CrtWave {
+    u32 x0, y0, x1, y1;
+    u64 first_sample;
+    u32 sample_count;
+    u32 slices;           /* each adds to a film of its own */
+    u32 blocks_per_slice;
+    u32 slots;            /* slices · blocks_per_slice · CRT_WAVE_BLOCK */
+    CRT_GLOBAL vec4 *rows;
+    CRT_GLOBAL u32 *state, *done, *valid; /* of each slot; its samples, and the finite ones */
+    CRT_GLOBAL u32 *queued;   /* the slots of each queue, in places for all slots */
+    CRT_GLOBAL u32 *lengths;  /* CRT_WAVE_QUEUES of even passes, then those of odd ones */
+    CRT_GLOBAL u32 *finished; /* how many slots are done */
+    CRT_GLOBAL f64 *sums;     /* as crt_render_pixel takes them, a film after another for the slices */
+    CRT_GLOBAL u64 *counts;
+    CRT_GLOBAL u32 *primitives;
+    CRT_GLOBAL u64 *rays;     /* pairs of counters */
+    u32 queue_of_kind[32];    /* by CRT_MATERIAL_… */
+    u32 queue_of_choice;      /* whose slots go on to other queues, or are traced on (crt_wave_choose) */
+    u32 queue_of_miss;        /* CRT_NONE: nothing shines there */
+} CrtWave;
+CRT_ASSERT_SIZE(CrtWave, 264);
+
+/* Words of 4 bytes that so many slots and queues take beside the rows. */
+#define CRT_WAVE_WORDS(slots, queues) ((slots) * (3u + (queues)) + 2u * CRT_WAVE_QUEUES + 1u)
+
+/* How many slots the wave's pixels and slices make, and where all that is kept of them begins. The host
+   calls. */
+CRT_FN void crt_wave_lay_out(CrtWave *wave, u32 queues, CRT_GLOBAL vec4 *rows, CRT_GLOBAL u32 *words) {
+    const u32 across = (wave->x1 - wave->x0 + CRT_WAVE_BLOCK_WIDTH - 1u) / CRT_WAVE_BLOCK_WIDTH;
+    const u32 down = (wave->y1 - wave->y0 + CRT_WAVE_BLOCK_HEIGHT - 1u) / CRT_WAVE_BLOCK_HEIGHT;
+    wave->blocks_per_slice = across * down;
+    wave->slots = wave->blocks_per_slice * wave->slices * CRT_WAVE_BLOCK;
+    wave->rows = rows;
+    wave->state = words;
+    wave->done = wave->state + wave->slots;
+    wave->valid = wave->done + wave->slots;
+    wave->queued = wave->valid + wave->slots;
+    wave->lengths = wave->queued + (u64)queues * wave->slots;
+    wave->finished = wave->lengths + 2u * CRT_WAVE_QUEUES;
+}
+
+/* Which samples of which pixel a slot takes. */
+typedef struct CrtWaveShare {
+    u32 x, y, slice;
+    u32 first, count; /* samples, from the launch's first */
+} CrtWaveShare;
+
+CRT_FN CrtWaveShare crt_wave_share(const CrtWave *wave, u32 slot) {
+    const u32 block = slot / CRT_WAVE_BLOCK, thread = slot % CRT_WAVE_BLOCK;
+    const u32 warp = thread / 32u, lane = thread % 32u;
+    const u32 across = (wave->x1 - wave->x0 + CRT_WAVE_BLOCK_WIDTH - 1u) / CRT_WAVE_BLOCK_WIDTH;
+    const u32 tile = block % wave->blocks_per_slice;
+    CrtWaveShare share;
+    share.slice = block / wave->blocks_per_slice;
+    share.x = wave->x0 + (tile % across) * CRT_WAVE_BLOCK_WIDTH + (warp % 2u) * 8u + lane % 8u;
+    share.y = wave->y0 + (tile / across) * CRT_WAVE_BLOCK_HEIGHT + (warp / 2u) * 4u + lane / 8u;
+    share.first = (u32)((u64)wave->sample_count * share.slice / wave->slices);
+    const u32 end = (u32)((u64)wave->sample_count * (share.slice + 1u) / wave->slices);
+    share.count = share.x < wave->x1 && share.y < wave->y1 ? end - share.first : 0u;
+    return share;
+}
+
+CRT_FN CRT_GLOBAL vec4 *crt_row(const CrtWave *wave, u32 row, u32 slot) {
+    return wave->rows + ((u64)row * wave->slots + slot);
+}
+CRT_FN vec4 crt_row_of(vec3 v, f32 w) { return make_vec4(V3X(v), V3Y(v), V3Z(v), w); }
+CRT_FN vec3 crt_row_vector(vec4 row) { return make_vec3(V4X(row), V4Y(row), V4Z(row)); }
+
+/* Whether the rows of the first hit are there. */
+CRT_FN int crt_wave_has_first_hit(const CrtContext *ctx) {
+    return CRT_HAS(AOV) && CRT_IN_MASK(ctx->scene->features, AOV);
+}
+
+CRT_FN vec4 crt_hero_lane(u32 lane) {
+    return make_vec4(lane == 0u ? 1.0f : 0.0f, lane == 1u ? 1.0f : 0.0f, lane == 2u ? 1.0f : 0.0f,
+                     lane == 3u ? 1.0f : 0.0f);
+}
+
+/* What crt_shade changes, but for the radiance. */
+CRT_FN void crt_store_vertex(const CrtContext *ctx, const CrtWave *wave, u32 slot, const CrtPath *path) {
+    u32 word = path->depth | (path->alone ? 0x80000000u : 0u);
+    if (CRT_HAS(DISPERSION))
+        word |= (u32)(V4Y(path->hero) + 2.0f * V4Z(path->hero) + 3.0f * V4W(path->hero)) << 29;
+    *crt_row(wave, CRT_ROW_ORIGIN, slot) = crt_row_of(path->ray.o, crt_from_bits(word));
+    *crt_row(wave, CRT_ROW_DIRECTION, slot) = crt_row_of(path->ray.d, crt_from_bits(path->sampler.b0));
+    *crt_row(wave, CRT_ROW_THROUGHPUT, slot) = path->throughput;
+    *crt_row(wave, CRT_ROW_POINT, slot) = crt_row_of(path->p, path->scatter_pdf);
+    *crt_row(wave, CRT_ROW_REST, slot) =
+        make_vec4(path->scatter_cosine, path->eta_square, path->wavelengths.u, crt_from_bits(path->media));
+    if (crt_has_light_tree(ctx)) *crt_row(wave, CRT_ROW_SIDE, slot) = crt_row_of(path->side, 0.0f);
+}
+
+CRT_FN void crt_store_first_hit(const CrtWave *wave, u32 slot, const CrtFirstHit *first) {
+    *crt_row(wave, CRT_ROW_ALBEDO, slot) = first->albedo;
+    *crt_row(wave, CRT_ROW_NORMAL, slot) = crt_row_of(first->normal, first->depth);
+    *crt_row(wave, CRT_ROW_PRIMITIVE, slot) = splat4(crt_from_bits(first->primitive));
+}
+
+/* The random numbers of the slot's sample, as its path left them. */
+CRT_FN CrtSampler crt_load_sampler(const CrtContext *ctx, const CrtWave *wave, u32 slot) {
+    CRT_GLOBAL const CrtScene *scene = ctx->scene;
+    const CrtWaveShare share = crt_wave_share(wave, slot);
+    CrtSampler sampler =
+        crt_sampler_begin(scene->sampler, scene->replicate_shift, scene->seed,
+                          (scene->crop_y + share.y) * scene->film_width + scene->crop_x + share.x,
+                          wave->first_sample + share.first + wave->done[slot]);
+    if (CRT_HAS(XORSHIFT) && scene->sampler == CRT_SAMPLER_XORSHIFT)
+        sampler.b0 = crt_bits(V4W(*crt_row(wave, CRT_ROW_DIRECTION, slot)));
+    return sampler;
+}
+
+CRT_FN CrtWavelengths crt_load_wavelengths(const CrtWave *wave, u32 slot) {
+    CrtWavelengths w;
+    w.position = *crt_row(wave, CRT_ROW_WAVELENGTHS, slot);
+    w.u = V4Z(*crt_row(wave, CRT_ROW_REST, slot));
+    return w;
+}
+
+CRT_FN CrtRay crt_load_path_ray(const CrtWave *wave, u32 slot) {
+    CrtRay ray;
+    ray.o = crt_row_vector(*crt_row(wave, CRT_ROW_ORIGIN, slot));
+    ray.d = crt_row_vector(*crt_row(wave, CRT_ROW_DIRECTION, slot));
+    ray.reach = CRT_INFINITY;
+    return ray;
+}
+
+CRT_FN u32 crt_load_depth(const CrtWave *wave, u32 slot) {
+    return crt_bits(V4W(*crt_row(wave, CRT_ROW_ORIGIN, slot))) & 0x1fffffffu;
+}
+
+/* Written in place, as crt_path_begin does. */
+CRT_FN void crt_load_path(const CrtContext *ctx, const CrtWave *wave, u32 slot, CrtPath *path) {
+    const vec4 point = *crt_row(wave, CRT_ROW_POINT, slot);
+    const vec4 rest = *crt_row(wave, CRT_ROW_REST, slot);
+    const u32 word = crt_bits(V4W(*crt_row(wave, CRT_ROW_ORIGIN, slot)));
+    path->ray = crt_load_path_ray(wave, slot);
+    path->sampler = crt_load_sampler(ctx, wave, slot);
+    path->wavelengths = crt_load_wavelengths(wave, slot);
+    path->hero = crt_hero_lane(CRT_HAS(DISPERSION) ? word >> 29 & 3u : 0u);
+    path->throughput = *crt_row(wave, CRT_ROW_THROUGHPUT, slot);
+    path->radiance = *crt_row(wave, CRT_ROW_RADIANCE, slot);
+    path->scatter_pdf = V4W(point);
+    path->scatter_cosine = V4X(rest);
+    path->p = crt_row_vector(point);
+    if (crt_has_light_tree(ctx)) path->side = crt_row_vector(*crt_row(wave, CRT_ROW_SIDE, slot));
+    path->eta_square = V4Y(rest);
+    path->depth = word & 0x1fffffffu;
+    path->alone = word >> 31 != 0u;
+    path->met = CRT_HAS(MIX) ? crt_bits(V4Z(*crt_row(wave, CRT_ROW_HIT_IDS, slot))) : CRT_NONE;
+    path->media = crt_bits(V4W(rest));
+}
+
+/* Numbers of a state that were taken while tracing. */
+CRT_FN void crt_store_xorshift(const CrtContext *ctx, const CrtWave *wave, u32 slot, const CrtSampler *s) {
+    if (!CRT_HAS(XORSHIFT) || ctx->scene->sampler != CRT_SAMPLER_XORSHIFT) return;
+    CRT_GLOBAL vec4 *row = crt_row(wave, CRT_ROW_DIRECTION, slot);
+    *row = crt_row_of(crt_row_vector(*row), crt_from_bits(s->b0));
+}
+
+CRT_FN void crt_store_hit(const CrtWave *wave, u32 slot, CrtHit hit) {
+    *crt_row(wave, CRT_ROW_HIT, slot) = make_vec4(hit.t, hit.b1, hit.b2, crt_from_bits(hit.slot));
+    *crt_row(wave, CRT_ROW_HIT_IDS, slot) =
+        make_vec4(crt_from_bits(hit.id), crt_from_bits(CRT_HAS(INSTANCES) ? hit.instance : 0u),
+                  crt_from_bits(CRT_NONE), 0.0f);
+}
+
+CRT_FN CrtRay crt_load_shadow_ray(const CrtWave *wave, u32 slot) {
+    const vec4 origin = *crt_row(wave, CRT_ROW_SHADOW_ORIGIN, slot);
+    CrtRay ray;
+    ray.o = crt_row_vector(origin);
+    ray.d = crt_row_vector(*crt_row(wave, CRT_ROW_SHADOW_DIRECTION, slot));
+    ray.reach = V4W(origin);
+    return ray;
+}
+
+/* That of the vertex that asked a shadow ray: crt_shade has counted it where the path goes on. */
+CRT_FN u32 crt_asking_depth(const CrtWave *wave, u32 slot, u32 state) {
+    return crt_load_depth(wave, slot) - (state & CRT_WAVE_ENDED ? 0u : 1u);
+}
+
+/* The state of a slot's ray while it passes surfaces. `state`: of the slot. */
+CRT_FN CrtPassage crt_load_passage(const CrtContext *ctx, const CrtWave *wave, u32 slot, u32 state) {
+    const int shadow = (state & CRT_WAVE_ASKED) != 0u;
+    const vec4 direction =
+        *crt_row(wave, shadow ? CRT_ROW_SHADOW_DIRECTION : CRT_ROW_DIRECTION, slot);
+    const u32 depth = shadow ? crt_asking_depth(wave, slot, state) : crt_load_depth(wave, slot);
+    const u32 media =
+        crt_bits(V4W(shadow ? direction : *crt_row(wave, CRT_ROW_REST, slot)));
+    const vec4 carried = *crt_row(wave, shadow ? CRT_ROW_SHADOW_RADIANCE : CRT_ROW_THROUGHPUT, slot);
+    const vec4 position =
+        crt_has_panes(ctx) ? *crt_row(wave, CRT_ROW_WAVELENGTHS, slot) : splat4(0.0f);
+    CrtPassage way = crt_passage(depth, shadow, crt_row_vector(direction), position, media, carried);
+    if ((state & CRT_WAVE_PASSED) != 0u) {
+        const vec4 passed = *crt_row(wave, CRT_ROW_PASSED, slot);
+        way.passed = crt_bits(V4W(passed));
+        if (shadow) way.d = crt_row_vector(passed);
+    }
+    return way;
+}
+
+CRT_FN CrtHit crt_load_hit(const CrtWave *wave, u32 slot) {
+    const vec4 found = *crt_row(wave, CRT_ROW_HIT, slot), ids = *crt_row(wave, CRT_ROW_HIT_IDS, slot);
+    CrtHit hit;
+    hit.t = V4X(found);
+    hit.b1 = V4Y(found);
+    hit.b2 = V4Z(found);
+    hit.slot = crt_bits(V4W(found));
+    hit.id = crt_bits(V4X(ids));
+    hit.instance = crt_bits(V4Y(ids));
+    return hit;
+}
+
+CRT_KERNEL_END
+
+#endif

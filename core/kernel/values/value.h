@@ -1,0 +1,28 @@
+/*
+ * value.h: the one reader of what materials and lights are made of. Tables and textures are not compiled for
+ * a scene that has none.
+ */
+#ifndef CRT_VALUE_H
+#define CRT_VALUE_H
+
+#include "kernel/values/texture.h"
+
+CRT_KERNEL_BEGIN
+
+/* A value at the path's wavelengths; all four are the same for a number. `surface`: where it is asked for; 0
+   where there is none, as for the environment: only what depends on no place is asked for there. */
+CRT_FN vec4 crt_value(const CrtContext *ctx, CrtValue value, const CrtSurface *surface, vec4 position) {
+    if (CRT_HAS(TEXTURE) && surface != 0) {
+        value = crt_unchecked(ctx, value, &surface->at);
+        if (crt_is_texture(value)) return crt_texture(*ctx, value & CRT_VALUE_INDEX, surface->at, position);
+    }
+    if (CRT_HAS(TABLE)) {
+        if ((value & CRT_VALUE_REFERENCE) != 0u)
+            return crt_spectrum(ctx, value & CRT_VALUE_INDEX, position);
+    }
+    return splat4(crt_from_bits(value));
+}
+
+CRT_KERNEL_END
+
+#endif
