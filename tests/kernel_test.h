@@ -4,7 +4,7 @@
 
 #include "catch.h"
 #include "compile/compile.h"
-#include "kernel/integrators/path.h"
+#include "kernel/schedule/pixel.h"
 
 #include <cmath>
 #include <cstdint>

@@ -242,11 +242,11 @@ TEST_CASE("kernel sources come with their includes, once each", "[loader]") {
 
 TEST_CASE("the whole kernel is one text", "[loader]") {
     const ScopedVariable embedded("CRT_KERNEL_DIR", std::nullopt);
-    const char* text = kernelSource("kernel/integrators/path.h");
+    const char* text = kernelSource("kernel/schedule/pixel.h");
     REQUIRE(text != nullptr);
     const std::string source = text;
     CHECK_THAT(source, !Contains("#include \""));
-    for (const char* guard : {"CRT_DIALECT_H", "CRT_FEATURES_H", "CRT_LAYOUT_H", "CRT_PATH_H"}) {
+    for (const char* guard : {"CRT_DIALECT_H", "CRT_FEATURES_H", "CRT_LAYOUT_H", "CRT_PIXEL_H"}) {
         const std::string define = std::string("#define ") + guard + "\n";
         INFO(guard);
         CHECK(source.find(define) != std::string::npos);
@@ -286,11 +286,11 @@ TEST_CASE("expanding includes", "[loader]") {
 
 TEST_CASE("CRT_KERNEL_DIR replaces the embedded sources", "[loader]") {
     const TemporaryFolder directory;
-    fs::create_directory(fs::path(directory.path()) / "integrators");
+    fs::create_directory(fs::path(directory.path()) / "schedule");
     fs::copy(fs::path(CRT_SOURCE_DIR) / "core/kernel/dialect", fs::path(directory.path()) / "dialect");
-    directory.write("integrators/path.h", "#include \"kernel/dialect/layout.h\"\nint changed;\n");
+    directory.write("schedule/pixel.h", "#include \"kernel/dialect/layout.h\"\nint changed;\n");
     const ScopedVariable kernels("CRT_KERNEL_DIR", directory.path());
-    const char* text = kernelSource("kernel/integrators/path.h");
+    const char* text = kernelSource("kernel/schedule/pixel.h");
     REQUIRE(text != nullptr);
     CHECK_THAT(text, Contains("int changed;") && Contains("typedef struct CrtScene"));
     // All or nothing: what is not there is not taken from the program.
@@ -302,8 +302,8 @@ TEST_CASE("CRT_KERNEL_DIR replaces the embedded sources", "[loader]") {
     fs::copy(directory.path(), other.path(), fs::copy_options::recursive);
     other.write("dialect/layout.h", "struct Changed;\n");
     const ScopedVariable changed("CRT_KERNEL_DIR", other.path());
-    CHECK_THROWS_WITH(kernelSource("kernel/integrators/path.h"),
+    CHECK_THROWS_WITH(kernelSource("kernel/schedule/pixel.h"),
                       Contains("holds another kernel/dialect/layout.h than this crt was built with"));
     const CrtHost host = makeHost(false);
-    CHECK(host.kernel_source(host.user, "kernel/integrators/path.h") == nullptr);
+    CHECK(host.kernel_source(host.user, "kernel/schedule/pixel.h") == nullptr);
 }

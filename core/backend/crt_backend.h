@@ -65,7 +65,7 @@ typedef struct CrtHost {
     int32_t (*progress)(void *user, double done);
     /* Directory for compiled kernels, existing and writable, or null when caching is off. */
     const char *cache_directory;
-    /* Text of a kernel header ("kernel/integrators/path.h") with its includes expanded, or null when the
+    /* Text of a kernel header ("kernel/schedule/pixel.h") with its includes expanded, or null when the
        name is unknown. Lives as long as the host. This is the same text for every backend: it may be
        compiled as C++17, CUDA C++ or OpenCL C 1.2. [any thread] */
     const char *(*kernel_source)(void *user, const char *name);

@@ -1,8 +1,8 @@
-// A complete crt backend in one file: the light transport of kernel/integrators/path.h compiled as plain
+// A complete crt backend in one file: the light transport of kernel/schedule/pixel.h compiled as plain
 // C++ and run pixel by pixel on one thread. It gives the same bits as every other backend, only slowly.
 // Copy it to begin your own.
 #include "backend/sdk/plugin_guard.h"
-#include "kernel/integrators/path.h"
+#include "kernel/schedule/pixel.h"
 
 #include <chrono>
 

@@ -3,7 +3,7 @@
 #include "embree_kernels.h"
 #include "embree_program.h"
 
-#include "kernel/integrators/path.h"
+#include "kernel/schedule/pixel.h"
 
 #include "traversal.h"
 

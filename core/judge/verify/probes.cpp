@@ -1,7 +1,7 @@
 #include "judge/verify/probes.h"
 
 #include "compile/compile.h"
-#include "kernel/integrators/path.h"
+#include "kernel/schedule/pixel.h"
 
 #include <fmt/format.h>
 

@@ -1,7 +1,7 @@
 #include "judge/verify/variants.h"
 
 #include "judge/verify/shapes.h"
-#include "kernel/integrators/path.h"
+#include "kernel/schedule/pixel.h"
 
 #include <memory>
 #include <span>

@@ -7,7 +7,7 @@
  * what has film channels of its own, in the order in which the film holds them, after X, Y and Z. `width` is
  * their number; films of fewer replicates than there can be have fewer of those, which come last.
  * CrtScene::<stem>_channel is the first of them. SOURCE says which kernel code adds to them: FIRST_HIT has a
- * function crt_first_hit_<stem> in path.h, SAMPLES is added by crt_add_sample.
+ * function crt_first_hit_<stem> in film.h, SAMPLES is added by crt_film_add_sample.
  *
  * CRT_PLANE_LIST(P) calls P(bit, NAME, Name, TYPE, SOURCE, "name in scenes", "EXR channels") for what has
  * none: IDS is the film's plane of primitive ids, FILM is made of the film when it is resolved. TYPE is

@@ -212,7 +212,7 @@ CRT_FN int crt_software_any(const CrtContext *ctx, CrtRay ray, CrtPassable *pass
 }
 
 /* The two hooks: the first hit, and whether something stops a shadow ray. A backend with a tracer of its own
- * defines CRT_BACKEND_TRACE and both functions after including path.h. */
+ * defines CRT_BACKEND_TRACE and both functions after including the kernel. */
 #ifdef CRT_BACKEND_TRACE
 CRT_FN CrtHit crt_trace_closest(const CrtContext *ctx, CrtRay ray);
 CRT_FN int crt_trace_any(const CrtContext *ctx, CrtRay ray, CrtPassable *passable);

@@ -6,7 +6,7 @@
 #ifndef CRT_WAVE_ROWS_H
 #define CRT_WAVE_ROWS_H
 
-#include "kernel/integrators/path.h"
+#include "kernel/schedule/pixel.h"
 
 CRT_KERNEL_BEGIN
 

@@ -43,13 +43,13 @@ CRT_FN int crt_wave_next_sample(const CrtContext *ctx, const CrtWave *wave, u32 
         wave->sums + film * scene->channels * 2u, wave->counts + film,
         wave->primitives != 0 ? wave->primitives + film : 0);
     if (!first_pass) {
-        work.done = wave->done[slot];
-        work.valid = wave->valid[slot];
+        work.film.done = wave->done[slot];
+        work.film.valid = wave->valid[slot];
         crt_wave_add(ctx, wave, slot, &work);
     }
-    wave->done[slot] = work.done;
-    wave->valid[slot] = work.valid;
-    if (work.done >= share.count) {
+    wave->done[slot] = work.film.done;
+    wave->valid[slot] = work.film.valid;
+    if (work.film.done >= share.count) {
         crt_pixel_end(&work);
         wave->state[slot] = CRT_WAVE_DONE;
         return 0;

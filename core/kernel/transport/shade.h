@@ -6,6 +6,7 @@
 #define CRT_SHADE_H
 
 #include "kernel/camera/camera.h"
+#include "kernel/film/film.h"
 #include "kernel/lights/light_tree.h"
 #include "kernel/lights/point_light.h"
 #include "kernel/lights/shape_light.h"
@@ -14,14 +15,6 @@
 #include "kernel/materials/normal_map.h"
 
 CRT_KERNEL_BEGIN
-
-/* First-hit quantities. */
-typedef struct CrtFirstHit {
-    vec4 albedo; /* at the path's wavelengths */
-    vec3 normal;
-    f32 depth;   /* along the ray, scene units; 0 where nothing is hit */
-    u32 primitive;
-} CrtFirstHit;
 
 typedef struct CrtPath {
     CrtRay ray;
