@@ -566,10 +566,10 @@ TEST_CASE("BSDF: Lambert's light is raised without a seam, and where it came fro
             const Vec3d w = spherical(-depth, random.uniform(-kPi, kPi));
             const double before = dot(w, normal);
             if (!(before > 1e-3)) continue;
-            const vec3 raised = crt_raised(&bsdf, toFloat(w));
+            const vec3 raised = crt_lift(&bsdf, toFloat(w));
             CHECK(raised.z >= 0);
             CHECK(length(toDouble(raised)) == Approx(1).margin(1e-6));
-            CHECK(crt_cosine_before(crt_below(&bsdf), dot3(raised, bsdf.ns), raised.z) ==
+            CHECK(crt_cosine_before_lift(crt_below(&bsdf), dot3(raised, bsdf.ns), raised.z) ==
                   Approx(before).margin(2e-3 * std::sin(tilt) + 1e-5 / tilt));
             if (i % 2 == 1) CHECK(length(minus(toDouble(raised), w)) < 0.2);
         }

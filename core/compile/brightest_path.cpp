@@ -61,8 +61,9 @@ private:
     CrtHit hitOf(std::uint32_t slot, std::uint32_t instance, std::uint32_t number) const;
     void prepare(CrtSurface surface, std::uint32_t slot, vec3 wo, vec4 position, CrtBsdf& bsdf) const;
     bool mirrors(const CrtBsdf& bsdf, CrtSampler& sampler) const;
-    vec4 mirrored(const CrtBsdf& bsdf, const CrtOffer& offer, CrtSampler& sampler) const;
-    std::optional<LitPath> carry(const CrtSurface& surface, const CrtBsdf& bsdf, const CrtOffer& offer,
+    vec4 mirrored(const CrtBsdf& bsdf, const CrtDirectSample& offer, CrtSampler& sampler) const;
+    std::optional<LitPath> carry(const CrtSurface& surface, const CrtBsdf& bsdf,
+                                 const CrtDirectSample& offer,
                                  vec4 share, const CrtWavelengths& wavelengths) const;
     bool occludes(const CrtRay& ray) const;
 
@@ -160,15 +161,15 @@ bool SurfacePoints::mirrors(const CrtBsdf& bsdf, CrtSampler& sampler) const {
     return false;
 }
 
-/// The factor on the light's spectrum that crt_ask_light computes.
-vec4 scattered(const CrtBsdf& bsdf, const CrtOffer& offer) {
+/// The factor on the light's spectrum that crt_sample_lights computes.
+vec4 scattered(const CrtBsdf& bsdf, const CrtDirectSample& offer) {
     return crt_is_delta(&bsdf) ? splat4(0) : crt_surface_eval(&bsdf, offer.wi) * offer.irradiance;
 }
 
 /// The same for a path that arrives from the mirror direction of the light. If scattered rays can also reach
 /// the light, the path carries at most its radiance. The cosine compensates for grazing angles, where paths
 /// are brighter and proportionally rarer.
-vec4 SurfacePoints::mirrored(const CrtBsdf& bsdf, const CrtOffer& offer, CrtSampler& sampler) const {
+vec4 SurfacePoints::mirrored(const CrtBsdf& bsdf, const CrtDirectSample& offer, CrtSampler& sampler) const {
     vec4 share = scattered(bsdf, offer);
     if (offer.pdf > 0) {
         const vec4 whole = splat4(offer.irradiance * offer.pdf);
@@ -179,7 +180,7 @@ vec4 SurfacePoints::mirrored(const CrtBsdf& bsdf, const CrtOffer& offer, CrtSamp
 }
 
 std::optional<LitPath> SurfacePoints::carry(const CrtSurface& surface, const CrtBsdf& bsdf,
-                                            const CrtOffer& offer, vec4 share,
+                                            const CrtDirectSample& offer, vec4 share,
                                             const CrtWavelengths& wavelengths) const {
     const auto* lights = CRT_ARRAY(CrtLight, context_.blob, context_.scene->lights);
     const vec4 position = wavelengths.position,
@@ -209,7 +210,7 @@ std::pair<std::optional<LitPath>, std::optional<LitPath>> SurfacePoints::light(c
     CrtBsdf bsdf;
     const CrtRandom2 u = crt_sample_2d(&sampler, CRT_DIM_VERTEX + CRT_DIM_BSDF);
     prepare(surface, hit.slot, crt_cosine_direction(surface.ns, u), wavelengths.position, bsdf);
-    const CrtOffer offer = crt_offer(&context_, &sampler, CRT_DIM_VERTEX, surface.p, &bsdf);
+    const CrtDirectSample offer = crt_direct_sample(&context_, &sampler, CRT_DIM_VERTEX, surface.p, &bsdf);
     if (!(offer.irradiance > 0)) return {};
     const std::optional<LitPath> from_anywhere =
         carry(surface, bsdf, offer, scattered(bsdf, offer), wavelengths);

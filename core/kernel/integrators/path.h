@@ -16,8 +16,9 @@ typedef struct CrtRayCount {
     u32 closest, shadow;
 } CrtRayCount;
 
-/* Answers what a vertex asked: adds the light that waits where nothing stops its ray. */
-CRT_FN void crt_answer(const CrtContext *ctx, CrtPath *path, const CrtShadow *shadow, CrtRayCount *rays) {
+/* Traces the pending shadow ray of a vertex; adds its radiance if nothing stops it. */
+CRT_FN void crt_resolve_shadow(const CrtContext *ctx, CrtPath *path, const CrtShadow *shadow,
+                               CrtRayCount *rays) {
     int blocked = 0;
     if (shadow->ray.reach > 0.0f) {
         rays->shadow += 1u;
@@ -69,11 +70,11 @@ CRT_FN int crt_path_vertex_passing(const CrtContext *ctx, CrtPath *path, CrtRayC
         }
         const u32 depth = path->depth;
         alive = crt_shade(ctx, path, hit, &shadow);
-        if (!(CRT_HAS(NEE) && shadow.asked)) return alive;
+        if (!(CRT_HAS(NEE) && shadow.pending)) return alive;
         /* On processors a search that never asks for panes is faster: 2 % of all instructions. On GPUs a
            second copy of the search spills 400 bytes of registers. */
         if (CRT_SIMD8 && !passable) {
-            crt_answer(ctx, path, &shadow, rays);
+            crt_resolve_shadow(ctx, path, &shadow, rays);
             return alive;
         }
         ray = shadow.ray;
@@ -86,14 +87,14 @@ CRT_FN int crt_path_vertex_passing(const CrtContext *ctx, CrtPath *path, CrtRayC
     }
 }
 
-/* Traces the path's ray to its next vertex, shades it and answers what it asks. Returns 0 when the path has
-   ended. */
+/* Traces the path's ray to its next vertex, shades it and resolves its shadow ray. Returns 0 when the path
+   has ended. */
 CRT_FN int crt_path_vertex(const CrtContext *ctx, CrtPath *path, CrtRayCount *rays) {
     if (CRT_HAS(OPACITY) || CRT_HAS(THIN_DIELECTRIC)) return crt_path_vertex_passing(ctx, path, rays);
     CrtShadow shadow;
     rays->closest += 1u;
     const int alive = crt_shade(ctx, path, crt_trace_closest(ctx, path->ray), &shadow);
-    if (CRT_HAS(NEE) && shadow.asked) crt_answer(ctx, path, &shadow, rays);
+    if (CRT_HAS(NEE) && shadow.pending) crt_resolve_shadow(ctx, path, &shadow, rays);
     return alive;
 }
 

@@ -189,7 +189,7 @@ CRT_FN CrtScatter crt_bsdf_sample(const CrtBsdf *b, CrtRandom2 u, CrtRandom2 cho
                 if ((b->flags & CRT_BSDF_DELTA) != 0u) return crt_sample_mirror_up(b, b->reflectance);
                 CrtBsdf about = *b;
                 about.ng = crt_sampled_about(b);
-                return crt_turned_up(b, crt_sample_rough_conductor(&about, u));
+                return crt_mirror_up(b, crt_sample_rough_conductor(&about, u));
             }
             break;
         case CRT_MATERIAL_DIELECTRIC:

@@ -65,7 +65,7 @@ CRT_FN CrtScatter crt_sample_layer_alone(const CrtBsdf *b, int layer, CrtScatter
         s.weight = splat4(pdf > 0.0f ? value / pdf * (seen / chance) : 0.0f);
     }
     s.valid = CRT_HAS(SMOOTH_NORMALS);
-    return crt_turned_up(b, s);
+    return crt_mirror_up(b, s);
 }
 
 /* A single direction of what lies below the layers, reached with `chance`. */

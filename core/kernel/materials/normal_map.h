@@ -132,7 +132,7 @@ CRT_FN CrtScatter crt_surface_sample(const CrtBsdf *b, CrtRandom2 u, CrtRandom2 
     if (!crt_is_facet(b) || !s.valid) return s;
     if (dot3(s.wi, b->base) < 0.0f) s.wi = crt_mirrored(s.wi, b->base);
     if (CRT_HAS(SMOOTH_NORMALS) && dot3(s.wi, b->side) < 0.0f && crt_is_tilted(b)) {
-        s.wi = crt_mirrored(s.wi, b->side); /* as crt_turned_up */
+        s.wi = crt_mirrored(s.wi, b->side); /* as crt_mirror_up */
         s.pdf = 0.0f;
     }
     s.valid = dot3(s.wi, b->side) > 0.0f;

@@ -42,12 +42,12 @@ CRT_FN vec4 crt_plastic(const CrtBsdf *b, vec3 wi, f32 *pdf) {
         const f32 raised = below * crt_lambert(cos_g);
         lambert = cos_g > 0.0f ? lambert + raised : 0.0f;
         const f32 direct = entering;
-        entering = cos_g > 0.0f ? entering + (1.0f - crt_coat_albedo(b, crt_cosine_before(below, cos_i,
+        entering = cos_g > 0.0f ? entering + (1.0f - crt_coat_albedo(b, crt_cosine_before_lift(below, cos_i,
                                                                                         cos_g))) * raised
                                 : 0.0f;
         if (crt_has_rough_base(b)) {
-            const f32 before = crt_cosine_before(below, cos_i, cos_g);
-            const vec4 shape = crt_rough_base(b, crt_before_raised(b, below, wi, before), before);
+            const f32 before = crt_cosine_before_lift(below, cos_i, cos_g);
+            const vec4 shape = crt_rough_base(b, crt_before_lift(b, below, wi, before), before);
             rough = cos_g > 0.0f ? rough + shape * (entering - direct) : splat4(0.0f);
         }
     }
@@ -72,13 +72,13 @@ CRT_FN CrtScatter crt_sample_plastic(const CrtBsdf *b, CrtRandom2 u, f32 choice)
         s.wi = normalize3(crt_reflect(b->wo, crt_visible_normal(b, u)));
         s.valid = dot3(s.wi, b->ns) > 0.0f;
     } else {
-        s.wi = crt_raised(b, crt_cosine_direction(b->ns, u));
+        s.wi = crt_lift(b, crt_cosine_direction(b->ns, u));
         s.valid = dot3(s.wi, b->ng) > 0.0f;
     }
     const vec4 value = crt_plastic(b, s.wi, &s.pdf);
     s.valid = s.valid && s.pdf > 0.0f;
     if (s.valid) s.weight = value / s.pdf;
-    return crt_turned_up(b, s);
+    return crt_mirror_up(b, s);
 }
 
 CRT_KERNEL_END

@@ -58,7 +58,7 @@ CRT_FN f32 crt_lambert_pdf(const CrtBsdf *b, vec3 wi) {
 /* A direction of Lambert's lobe, raised if it is below the surface. In the plane of both normals those
    below lie between the ellipse cos θ √(1 − y²) and the circle √(1 − y²), seen along n_s; that
    crescent is stretched over the disk that is seen along n_g. The horizon stays where it is. */
-CRT_FN vec3 crt_raised(const CrtBsdf *b, vec3 wi) {
+CRT_FN vec3 crt_lift(const CrtBsdf *b, vec3 wi) {
     if (!CRT_HAS(SMOOTH_NORMALS) || dot3(wi, b->ng) > 0.0f) return wi;
     const f32 below = crt_below(b);
     if (!(below > 0.0f)) return wi;
@@ -75,7 +75,7 @@ CRT_FN vec3 crt_raised(const CrtBsdf *b, vec3 wi) {
 }
 
 /* Cosine with n_s of the direction that was raised to one at cos_s and cos_g with n_s and n_g. */
-CRT_FN f32 crt_cosine_before(f32 below, f32 cos_s, f32 cos_g) {
+CRT_FN f32 crt_cosine_before_lift(f32 below, f32 cos_s, f32 cos_g) {
     const f32 cosine = 1.0f - 2.0f * below;
     const f32 x = (cos_s - cos_g * cosine) * (0.5f / crt_sqrt(below * (1.0f - below)));
     const f32 square = x * x + cos_g * cos_g;
@@ -85,7 +85,7 @@ CRT_FN f32 crt_cosine_before(f32 below, f32 cos_s, f32 cos_g) {
 }
 
 /* That direction, at the cosine cos_s with n_s, of one that was raised to wi. */
-CRT_FN vec3 crt_before_raised(const CrtBsdf *b, f32 below, vec3 wi, f32 cos_s) {
+CRT_FN vec3 crt_before_lift(const CrtBsdf *b, f32 below, vec3 wi, f32 cos_s) {
     const f32 cosine = 1.0f - 2.0f * below;
     const vec3 away = (b->ns * cosine - b->ng) * (0.5f / crt_sqrt(below * (1.0f - below)));
     const f32 x = dot3(wi, away), z = dot3(wi, b->ns);
@@ -96,7 +96,7 @@ CRT_FN vec3 crt_before_raised(const CrtBsdf *b, f32 below, vec3 wi, f32 cos_s) {
 CRT_FN CrtScatter crt_sample_lambert(const CrtBsdf *b, CrtRandom2 u) {
     if (!CRT_HAS(SMOOTH_NORMALS)) return crt_sample_diffuse(b->reflectance, b->ns, b->ng, u);
     CrtScatter s = crt_no_scatter();
-    s.wi = crt_raised(b, crt_cosine_direction(b->ns, u));
+    s.wi = crt_lift(b, crt_cosine_direction(b->ns, u));
     s.weight = b->reflectance;
     s.pdf = crt_lambert_pdf(b, s.wi);
     s.valid = dot3(s.wi, b->ng) > 0.0f && s.pdf > 0.0f;
@@ -104,7 +104,7 @@ CRT_FN CrtScatter crt_sample_lambert(const CrtBsdf *b, CrtRandom2 u) {
 }
 
 /* What goes below the surface, mirrored up by it. */
-CRT_FN CrtScatter crt_turned_up(const CrtBsdf *b, CrtScatter s) {
+CRT_FN CrtScatter crt_mirror_up(const CrtBsdf *b, CrtScatter s) {
     if (!CRT_HAS(SMOOTH_NORMALS) || !s.valid) return s;
     if (dot3(s.wi, b->ng) < 0.0f) {
         s.wi = crt_mirrored(s.wi, b->ng);
@@ -122,7 +122,7 @@ CRT_FN int crt_keeps_side(const CrtBsdf *b, vec3 w) {
 
 /* Of a BSDF that sends light to either side of n_s: a direction that is on the other side of the face is
    mirrored by the face. So what is refracted always crosses the face, and what is reflected never does:
-   factors n² come in pairs. The direction becomes a single one, as in crt_turned_up. */
+   factors n² come in pairs. The direction becomes a single one, as in crt_mirror_up. */
 CRT_FN CrtScatter crt_to_its_side(const CrtBsdf *b, CrtScatter s) {
     if (!(CRT_HAS(SMOOTH_NORMALS) || CRT_HAS(NORMAL_MAP)) || !s.valid || crt_keeps_side(b, s.wi)) return s;
     const int reflected = dot3(s.wi, b->ns) > 0.0f;
@@ -151,7 +151,7 @@ CRT_FN int crt_sees_face(const CrtContext *ctx, u32 material, u32 depth) {
 CRT_FN vec3 crt_sampled_about(const CrtBsdf *b) { return CRT_HAS(SMOOTH_NORMALS) ? b->ns : b->ng; }
 
 CRT_FN CrtScatter crt_sample_mirror_up(const CrtBsdf *b, vec4 reflectance) {
-    return crt_turned_up(b, crt_sample_mirror(reflectance, b->wo, b->ns, crt_sampled_about(b)));
+    return crt_mirror_up(b, crt_sample_mirror(reflectance, b->wo, b->ns, crt_sampled_about(b)));
 }
 
 CRT_KERNEL_END

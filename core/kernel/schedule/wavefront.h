@@ -74,8 +74,8 @@ CRT_FN CrtHit crt_trace_passing(const CrtContext *ctx, CrtSampler *sampler, CrtP
 
 /* Traces the shadow ray that a slot waits for, and adds its light where nothing stops it. Returns 0 where
    crt_wave_choose has to say whether it passes what it meets. */
-CRT_FN int crt_wave_answer(const CrtContext *ctx, const CrtWave *wave, u32 slot, u32 state,
-                           CrtRayCount *rays) {
+CRT_FN int crt_wave_resolve_shadow(const CrtContext *ctx, const CrtWave *wave, u32 slot, u32 state,
+                                   CrtRayCount *rays) {
     CrtRay ray = crt_load_shadow_ray(wave, slot);
     int blocked = 0;
     if (ray.reach > 0.0f) {
@@ -149,7 +149,7 @@ CRT_FN u32 crt_wave_trace(const CrtContext *ctx, const CrtWave *wave, u32 slot, 
     u32 state = first_pass ? CRT_WAVE_ENDED : wave->state[slot];
     if ((state & CRT_WAVE_DONE) != 0u) return CRT_NONE;
     if ((state & CRT_WAVE_ASKED) != 0u) {
-        if (!crt_wave_answer(ctx, wave, slot, state, rays)) return wave->queue_of_choice;
+        if (!crt_wave_resolve_shadow(ctx, wave, slot, state, rays)) return wave->queue_of_choice;
         state &= CRT_WAVE_ENDED;
     }
     if ((state & CRT_WAVE_ENDED) != 0u) {
@@ -226,7 +226,7 @@ CRT_FN void crt_wave_shade(const CrtContext *ctx, const CrtWave *wave, u32 slot)
     *crt_row(wave, CRT_ROW_RADIANCE, slot) = path.radiance;
     if (alive) crt_store_vertex(ctx, wave, slot, &path);
     if (first) crt_store_first_hit(wave, slot, &path.first);
-    if (CRT_HAS(NEE) && shadow.asked) {
+    if (CRT_HAS(NEE) && shadow.pending) {
         state |= CRT_WAVE_ASKED;
         *crt_row(wave, CRT_ROW_SHADOW_ORIGIN, slot) = crt_row_of(shadow.ray.o, shadow.ray.reach);
         *crt_row(wave, CRT_ROW_SHADOW_DIRECTION, slot) =

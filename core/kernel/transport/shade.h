@@ -1,6 +1,7 @@
 /*
- * shade.h: what happens to a path at a vertex: what it gains from emitters met, what light sampling asks,
- * and where it is scattered to. Nothing here traces a ray, so that a backend may trace as it likes.
+ * shade.h: what happens to a path at a vertex: emission of emitters met, a shadow ray of light sampling,
+ * and the direction in which the path goes on. Nothing here traces a ray, so that a backend may trace as it
+ * likes.
  */
 #ifndef CRT_SHADE_H
 #define CRT_SHADE_H
@@ -129,10 +130,10 @@ CRT_FN void crt_absorb(const CrtContext *ctx, CrtPath *path, const CrtSurface *s
         path->throughput * crt_transmittance(ctx, medium, distance, path->wavelengths.position);
 }
 
-/* A question that a vertex asks, and what it adds to the path's radiance if nothing is met. It is answered
-   before the path's next vertex. */
+/* A pending shadow ray, and the radiance to add to the path if nothing stops it. It is resolved before the
+   path's next vertex. */
 typedef struct CrtShadow {
-    int asked;
+    int pending;
     CrtRay ray; /* its reach is 0 or less where nothing fits in between */
     u32 media;  /* around it where it begins */
     vec4 radiance;
@@ -146,9 +147,9 @@ CRT_FN void crt_absorb_shadow(const CrtContext *ctx, const CrtPath *path, const 
                                                             distance, path->wavelengths.position);
 }
 
-/* What light sampling offers a point: a direction, and the light that comes from there if nothing is in the
-   way. */
-typedef struct CrtOffer {
+/* A direct-lighting sample of a point: the direction to a light, and the light that arrives if nothing is in
+   the way. */
+typedef struct CrtDirectSample {
     u32 light;       /* row of the light table */
     vec3 wi;         /* unit, from the point */
     f32 distance;    /* along wi; infinite from outside the scene */
@@ -161,55 +162,55 @@ typedef struct CrtOffer {
     f32 cosine;      /* of wi with it */
     int environment; /* from the environment, of which: */
     CrtEnvironmentPlace place;
-} CrtOffer;
+} CrtDirectSample;
 
-CRT_FN CrtOffer crt_offer_of(const CrtContext *ctx, u32 light, CrtSampler *sampler, u32 dimension, vec3 p,
-                             const CrtBsdf *bsdf) {
-    CrtOffer offer;
-    offer.light = light;
-    offer.distance = CRT_INFINITY;
-    offer.point = p;
-    offer.normal = bsdf->ns;
-    offer.reach = offer.cosine = 0.0f;
-    offer.area = 0;
-    offer.place = crt_no_place();
-    offer.environment = CRT_HAS(ENVIRONMENT_LIGHT) && offer.light + 1u == ctx->scene->environment_light;
-    if (offer.environment) {
+CRT_FN CrtDirectSample crt_direct_sample_of(const CrtContext *ctx, u32 light, CrtSampler *sampler,
+                                            u32 dimension, vec3 p, const CrtBsdf *bsdf) {
+    CrtDirectSample direct;
+    direct.light = light;
+    direct.distance = CRT_INFINITY;
+    direct.point = p;
+    direct.normal = bsdf->ns;
+    direct.reach = direct.cosine = 0.0f;
+    direct.area = 0;
+    direct.place = crt_no_place();
+    direct.environment = CRT_HAS(ENVIRONMENT_LIGHT) && direct.light + 1u == ctx->scene->environment_light;
+    if (direct.environment) {
         const CrtEnvironmentSample s = crt_environment_sample(ctx, sampler, dimension, crt_base(bsdf));
-        offer.wi = s.wi;
-        offer.pdf = s.pdf;
-        offer.place = s.place;
+        direct.wi = s.wi;
+        direct.pdf = s.pdf;
+        direct.place = s.place;
         /* Of one without an image, what would be transmitted is left to scattered rays. */
         const int sampled =
             s.pdf > 0.0f && (crt_has_environment_image(ctx) || dot3(s.wi, crt_side(bsdf)) > 0.0f);
-        offer.irradiance = sampled ? 1.0f / s.pdf : 0.0f;
-        return offer;
+        direct.irradiance = sampled ? 1.0f / s.pdf : 0.0f;
+        return direct;
     }
-    if (CRT_HAS(POINT_LIGHT) && !crt_is_shape_light(ctx, offer.light) &&
-        CRT_ARRAY(CrtLight, ctx->blob, ctx->scene->lights)[offer.light].kind >= CRT_LIGHT_POINT) {
-        const CrtPointLightSample s = crt_point_light_sample(ctx, offer.light, sampler, dimension, p);
-        offer.wi = s.wi;
-        offer.pdf = s.pdf;
-        offer.irradiance = s.irradiance;
-        offer.distance = s.distance;
-        offer.point = s.point;
-        offer.reach = CRT_POINT_LIGHT_REACH;
-        return offer;
+    if (CRT_HAS(POINT_LIGHT) && !crt_is_shape_light(ctx, direct.light) &&
+        CRT_ARRAY(CrtLight, ctx->blob, ctx->scene->lights)[direct.light].kind >= CRT_LIGHT_POINT) {
+        const CrtPointLightSample s = crt_point_light_sample(ctx, direct.light, sampler, dimension, p);
+        direct.wi = s.wi;
+        direct.pdf = s.pdf;
+        direct.irradiance = s.irradiance;
+        direct.distance = s.distance;
+        direct.point = s.point;
+        direct.reach = CRT_POINT_LIGHT_REACH;
+        return direct;
     }
     const CrtLightSample s =
-        crt_is_shape_light(ctx, offer.light)
-            ? crt_shape_light_sample(ctx, offer.light, sampler, dimension, p)
-            : crt_light_sample(ctx, offer.light, sampler, dimension, p);
-    offer.area = 1;
-    offer.wi = s.wi;
-    offer.pdf = s.pdf;
-    offer.irradiance = s.pdf > 0.0f ? 1.0f / s.pdf : 0.0f;
-    offer.distance = s.distance;
-    offer.point = s.point;
-    offer.reach = s.reach;
-    offer.normal = s.normal;
-    offer.cosine = s.cosine;
-    return offer;
+        crt_is_shape_light(ctx, direct.light)
+            ? crt_shape_light_sample(ctx, direct.light, sampler, dimension, p)
+            : crt_light_sample(ctx, direct.light, sampler, dimension, p);
+    direct.area = 1;
+    direct.wi = s.wi;
+    direct.pdf = s.pdf;
+    direct.irradiance = s.pdf > 0.0f ? 1.0f / s.pdf : 0.0f;
+    direct.distance = s.distance;
+    direct.point = s.point;
+    direct.reach = s.reach;
+    direct.normal = s.normal;
+    direct.cosine = s.cosine;
+    return direct;
 }
 
 /* The normal of a surface that scatters nothing to its other side; otherwise of length 0. */
@@ -217,8 +218,8 @@ CRT_FN vec3 crt_scattering_side(const CrtBsdf *bsdf) {
     return (bsdf->flags & CRT_BSDF_TRANSMITS) == 0u ? crt_side(bsdf) : make_vec3(0.0f, 0.0f, 0.0f);
 }
 
-CRT_FN CrtOffer crt_offer(const CrtContext *ctx, CrtSampler *sampler, u32 dimension, vec3 p,
-                          const CrtBsdf *bsdf) {
+CRT_FN CrtDirectSample crt_direct_sample(const CrtContext *ctx, CrtSampler *sampler, u32 dimension, vec3 p,
+                                         const CrtBsdf *bsdf) {
     u32 light, none = 0u;
     f32 probability = 1.0f;
     if (crt_has_light_tree(ctx)) {
@@ -228,51 +229,51 @@ CRT_FN CrtOffer crt_offer(const CrtContext *ctx, CrtSampler *sampler, u32 dimens
     } else {
         light = crt_light_choose(ctx, sampler, dimension);
     }
-    CrtOffer offer = crt_offer_of(ctx, light, sampler, dimension, p, bsdf);
+    CrtDirectSample direct = crt_direct_sample_of(ctx, light, sampler, dimension, p, bsdf);
     if (crt_has_light_tree(ctx)) {
-        offer.irradiance = none ? 0.0f : offer.irradiance / probability;
-        offer.pdf = offer.pdf * probability;
+        direct.irradiance = none ? 0.0f : direct.irradiance / probability;
+        direct.pdf = direct.pdf * probability;
     }
-    return offer;
+    return direct;
 }
 
-/* Probability with which the BSDF finds what is offered, over that of light sampling. An emitter's are per
-   area (crt_add_emission): of a ray scattered at the shadow ray's origin pdf·|n·d|/|d|³, of light
+/* Probability with which the BSDF finds a direct-lighting sample, over that of light sampling. An emitter's
+   are per area (crt_add_emission): of a ray scattered at the shadow ray's origin pdf·|n·d|/|d|³, of light
    sampling pdf·cos/distance². */
-CRT_FN f32 crt_offer_ratio(const CrtOffer *offer, const CrtBsdf *bsdf, CrtRay ray) {
+CRT_FN f32 crt_direct_ratio(const CrtDirectSample *direct, const CrtBsdf *bsdf, CrtRay ray) {
     const f32 squared = dot3(ray.d, ray.d);
-    const vec3 towards = offer->area ? ray.d * (1.0f / crt_sqrt(squared)) : offer->wi;
+    const vec3 towards = direct->area ? ray.d * (1.0f / crt_sqrt(squared)) : direct->wi;
     const f32 pdf = crt_surface_pdf(bsdf, towards);
-    if (!offer->area) return pdf / offer->pdf;
-    return pdf * crt_abs(dot3(offer->normal, towards)) * offer->distance * offer->distance /
-           (offer->pdf * offer->cosine * squared);
+    if (!direct->area) return pdf / direct->pdf;
+    return pdf * crt_abs(dot3(direct->normal, towards)) * direct->distance * direct->distance /
+           (direct->pdf * direct->cosine * squared);
 }
 
 /* Next event estimation: a light, and a ray towards it. */
-CRT_FN void crt_ask_light(const CrtContext *ctx, CrtPath *path, const CrtSurface *surface,
-                          const CrtBsdf *bsdf, u32 dimension, CrtShadow *shadow) {
-    const CrtOffer offer = crt_offer(ctx, &path->sampler, dimension, surface->p, bsdf);
-    if (!(offer.irradiance > 0.0f)) return;
-    const int before = dot3(offer.wi, crt_side(bsdf)) > 0.0f;
+CRT_FN void crt_sample_lights(const CrtContext *ctx, CrtPath *path, const CrtSurface *surface,
+                              const CrtBsdf *bsdf, u32 dimension, CrtShadow *shadow) {
+    const CrtDirectSample direct = crt_direct_sample(ctx, &path->sampler, dimension, surface->p, bsdf);
+    if (!(direct.irradiance > 0.0f)) return;
+    const int before = dot3(direct.wi, crt_side(bsdf)) > 0.0f;
     if ((bsdf->flags & (before ? CRT_BSDF_REFLECTS : CRT_BSDF_TRANSMITS)) == 0u) return;
-    const vec4 scattered = crt_surface_eval(bsdf, offer.wi);
+    const vec4 scattered = crt_surface_eval(bsdf, direct.wi);
     if (max4(scattered) == 0.0f) return;
-    const int far = offer.distance == CRT_INFINITY;
-    shadow->asked = 1;
-    shadow->ray.o = crt_offset_origin(surface->p, surface->clearance, crt_side(bsdf), offer.wi);
-    shadow->ray.d = far ? offer.wi : offer.point - shadow->ray.o;
-    shadow->ray.reach = far ? CRT_INFINITY : offer.reach;
-    f32 weight = offer.irradiance;
-    if (offer.pdf > 0.0f && ctx->scene->nee == CRT_NEE_MIS)
-        weight = weight * crt_power_heuristic(crt_offer_ratio(&offer, bsdf, shadow->ray));
+    const int far = direct.distance == CRT_INFINITY;
+    shadow->pending = 1;
+    shadow->ray.o = crt_offset_origin(surface->p, surface->clearance, crt_side(bsdf), direct.wi);
+    shadow->ray.d = far ? direct.wi : direct.point - shadow->ray.o;
+    shadow->ray.reach = far ? CRT_INFINITY : direct.reach;
+    f32 weight = direct.irradiance;
+    if (direct.pdf > 0.0f && ctx->scene->nee == CRT_NEE_MIS)
+        weight = weight * crt_power_heuristic(crt_direct_ratio(&direct, bsdf, shadow->ray));
     const vec4 position = path->wavelengths.position;
     const vec4 light =
-        offer.environment
-            ? crt_environment_radiance(ctx, offer.place, position)
-            : crt_value(ctx, CRT_ARRAY(CrtLight, ctx->blob, ctx->scene->lights)[offer.light].radiance, 0,
+        direct.environment
+            ? crt_environment_radiance(ctx, direct.place, position)
+            : crt_value(ctx, CRT_ARRAY(CrtLight, ctx->blob, ctx->scene->lights)[direct.light].radiance, 0,
                         position);
     shadow->radiance = path->throughput * scattered * light * weight;
-    if (CRT_HAS(MEDIA)) crt_absorb_shadow(ctx, path, surface, bsdf, offer.wi, offer.distance, shadow);
+    if (CRT_HAS(MEDIA)) crt_absorb_shadow(ctx, path, surface, bsdf, direct.wi, direct.distance, shadow);
 }
 
 /* What happens to a path at `hit`, which its ray has met: it gains what is emitted there, and is scattered.
@@ -280,7 +281,7 @@ CRT_FN void crt_ask_light(const CrtContext *ctx, CrtPath *path, const CrtSurface
    whether or not the path goes on. */
 CRT_FN int crt_shade(const CrtContext *ctx, CrtPath *path, CrtHit hit, CrtShadow *shadow) {
     CRT_GLOBAL const CrtScene *scene = ctx->scene;
-    shadow->asked = 0;
+    shadow->pending = 0;
     if (hit.slot == CRT_NONE) {
         if (CRT_HAS(MEDIA)) crt_absorb(ctx, path, 0);
         if (CRT_HAS(ENVIRONMENT) && scene->environment != CRT_NONE) crt_add_environment(ctx, path);
@@ -324,7 +325,7 @@ CRT_FN int crt_shade(const CrtContext *ctx, CrtPath *path, CrtHit hit, CrtShadow
 
     if (CRT_HAS(NEE) && scene->nee != CRT_NEE_NONE && scene->lights.count != 0u &&
         !crt_is_delta(&bsdf))
-        crt_ask_light(ctx, path, &surface, &bsdf, dimension, shadow);
+        crt_sample_lights(ctx, path, &surface, &bsdf, dimension, shadow);
     const CrtRandom2 u = crt_sample_2d(&path->sampler, dimension + CRT_DIM_BSDF);
     CrtRandom2 choice = u;
     if ((CRT_HAS(ROUGH_DIELECTRIC) || CRT_HAS(PLASTIC)) && (bsdf.flags & CRT_BSDF_CHOOSES) != 0u)

@@ -118,8 +118,8 @@ CRT_FN vec4 crt_vertex_color(const CrtContext *ctx, const CrtFacePlace *at, vec4
 
 CRT_FN int crt_is_texture(CrtValue value) { return (value & CRT_VALUE_KIND) == CRT_VALUE_TEXTURE; }
 
-/* What a checker, or a checker of checkers, has at the place. */
-CRT_FN CrtValue crt_unchecked(const CrtContext *ctx, CrtValue value, const CrtFacePlace *at) {
+/* Resolves nested checkers to the value at a place. */
+CRT_FN CrtValue crt_resolve_checker(const CrtContext *ctx, CrtValue value, const CrtFacePlace *at) {
     while (crt_is_texture(value)) {
         const CrtTexture texture =
             CRT_ARRAY(CrtTexture, ctx->blob, ctx->scene->textures)[value & CRT_VALUE_INDEX];

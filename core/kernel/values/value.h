@@ -13,7 +13,7 @@ CRT_KERNEL_BEGIN
    where there is none, as for the environment: only what depends on no place is asked for there. */
 CRT_FN vec4 crt_value(const CrtContext *ctx, CrtValue value, const CrtSurface *surface, vec4 position) {
     if (CRT_HAS(TEXTURE) && surface != 0) {
-        value = crt_unchecked(ctx, value, &surface->at);
+        value = crt_resolve_checker(ctx, value, &surface->at);
         if (crt_is_texture(value)) return crt_texture(*ctx, value & CRT_VALUE_INDEX, surface->at, position);
     }
     if (CRT_HAS(TABLE)) {
