@@ -24,7 +24,7 @@ T* onDevice(CUdeviceptr address) {
 Wavefront::Wavefront(const Device& device, const void* blob)
     : device_(device),
       plan_(plugin::planWave(blob)),
-      row_count_(CRT_WAVE_ROWS(static_cast<const kernel::CrtScene*>(blob)->features)) {}
+      row_count_(kernel::crt_wave_rows(static_cast<const kernel::CrtScene*>(blob)->features)) {}
 
 std::uint32_t Wavefront::mostSlices(std::uint64_t blocks_across) const {
     return static_cast<std::uint32_t>(

@@ -42,7 +42,7 @@ Wavefront::Wavefront(const Device& device, const Session& session, const void* b
                      const Allocate& allocate)
     : device_(device), session_(session), plan_(plugin::planWave(blob)) {
     const auto& scene = *static_cast<const kernel::CrtScene*>(blob);
-    const std::uint32_t rows = CRT_WAVE_ROWS(scene.features);
+    const std::uint32_t rows = kernel::crt_wave_rows(scene.features);
     const std::uint64_t across = slotsAcross(scene.width);
     const std::uint64_t all = across * divideUp(scene.height, CRT_WAVE_BLOCK_HEIGHT);
     const std::uint64_t affordable = std::min(device.memory_bytes / 16 / plan_.bytesPerSlot(rows),

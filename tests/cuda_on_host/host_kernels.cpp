@@ -111,7 +111,7 @@ void launchWave(const void* scene_blob, const Launch& launch, std::uint32_t slic
     wave.sample_count = launch.sample_count;
     wave.slices = slices;
     crt_wave_lay_out(&wave, kQueues, nullptr, nullptr);
-    std::vector<vec4> rows(std::size_t{wave.slots} * CRT_WAVE_ROWS(CRT_FEATURES_ALL));
+    std::vector<vec4> rows(std::size_t{wave.slots} * crt_wave_rows(CRT_FEATURES_ALL));
     std::vector<u32> words(CRT_WAVE_WORDS(std::size_t{wave.slots}, kQueues));
     crt_wave_lay_out(&wave, kQueues, rows.data(), words.data());
     const unsigned blocks = wave.slots / CRT_WAVE_BLOCK;

@@ -22,33 +22,27 @@ CRT_KERNEL_BEGIN
 #define CRT_WAVE_PASSED 8u /* the ray that it waits for goes on behind a surface that it has passed */
 #define CRT_WAVE_LAST 16u /* behind the surface that its shadow ray meets there is no other */
 
-/* Rows. */
-#define CRT_ROW_ORIGIN 0u       /* of the ray; depth, hero wavelength and `alone` */
-#define CRT_ROW_DIRECTION 1u    /* of the ray; state of xorshift */
-#define CRT_ROW_THROUGHPUT 2u
-#define CRT_ROW_RADIANCE 3u
-#define CRT_ROW_WAVELENGTHS 4u  /* positions */
-#define CRT_ROW_POINT 5u        /* where it was scattered; with which density */
-#define CRT_ROW_REST 6u         /* scatter_cosine, eta_square, the wavelengths' number, media */
-#define CRT_ROW_HIT 7u          /* t, b1, b2, slot of the scene */
-#define CRT_ROW_HIT_IDS 8u      /* primitive, instance, material of a mix */
-#define CRT_ROW_SHADOW_ORIGIN 9u /* and reach */
-#define CRT_ROW_SHADOW_DIRECTION 10u /* and the media around it */
-#define CRT_ROW_SHADOW_RADIANCE 11u
-#define CRT_ROW_SIDE 12u        /* where there is a tree of lights, or where there are AOVs, too: */
-#define CRT_ROW_ALBEDO 13u      /* first hit: */
-#define CRT_ROW_NORMAL 14u      /* and depth */
-#define CRT_ROW_PRIMITIVE 15u
-/* Where there are panes: the origin of a path's ray behind what it has passed, or the first direction of a
-   shadow ray; and how many surfaces it has passed. */
-#define CRT_ROW_PASSED 16u
+/* Rows of a slot: what it waits for, then the state of its path. */
+#define CRT_ROW_NUMBER(ROW, DECLARATIONS, LANES) CRT_ROW_##ROW,
+enum CrtWaveRow {
+    CRT_ROW_HIT,              /* t, b1, b2, slot of the scene */
+    CRT_ROW_HIT_IDS,          /* primitive, instance, material of a mix */
+    CRT_ROW_SHADOW_ORIGIN,    /* and reach */
+    CRT_ROW_SHADOW_DIRECTION, /* and the media around it */
+    CRT_ROW_SHADOW_RADIANCE,
+    CRT_PATH_STATE(CRT_ROW_NUMBER, CRT_ROW_NUMBER, CRT_ROW_NUMBER, CRT_ROW_NUMBER)
+    /* Where there are panes: the origin of a path's ray behind what it has passed, or the first direction of
+       a shadow ray; and how many surfaces it has passed. */
+    CRT_ROW_PASSED
+};
 
-/* Rows that a scene's slots have. */
-#define CRT_WAVE_ROWS(features)                     \
-    (((features) & CRT_FEATURE_THIN_DIELECTRIC) ? 17u \
-     : ((features) & CRT_FEATURE_AOV)          ? 16u \
-     : ((features) & CRT_FEATURE_LIGHT_TREE)   ? 13u \
-                                               : 12u)
+/* How many rows the slots of a scene have. */
+CRT_FN u32 crt_wave_rows(u64 features) {
+    if (CRT_IN_MASK(features, THIN_DIELECTRIC)) return CRT_ROW_PASSED + 1u;
+    if (CRT_IN_MASK(features, AOV)) return CRT_ROW_PRIMITIVE + 1u;
+    if (CRT_IN_MASK(features, LIGHT_TREE)) return CRT_ROW_SIDE + 1u;
+    return CRT_ROW_SIDE;
+}
 
 /* A launch: samples [first_sample, first_sample + sample_count) of the pixels [x0, x1) × [y0, y1), and
    where its slots are kept. */
@@ -125,31 +119,6 @@ CRT_FN int crt_wave_has_first_hit(const CrtContext *ctx) {
     return CRT_HAS(AOV) && CRT_IN_MASK(ctx->scene->features, AOV);
 }
 
-CRT_FN vec4 crt_hero_lane(u32 lane) {
-    return make_vec4(lane == 0u ? 1.0f : 0.0f, lane == 1u ? 1.0f : 0.0f, lane == 2u ? 1.0f : 0.0f,
-                     lane == 3u ? 1.0f : 0.0f);
-}
-
-/* What crt_shade changes, but for the radiance. */
-CRT_FN void crt_store_vertex(const CrtContext *ctx, const CrtWave *wave, u32 slot, const CrtPath *path) {
-    u32 word = path->depth | (path->alone ? 0x80000000u : 0u);
-    if (CRT_HAS(DISPERSION))
-        word |= (u32)(V4Y(path->hero) + 2.0f * V4Z(path->hero) + 3.0f * V4W(path->hero)) << 29;
-    *crt_row(wave, CRT_ROW_ORIGIN, slot) = crt_row_of(path->ray.o, crt_from_bits(word));
-    *crt_row(wave, CRT_ROW_DIRECTION, slot) = crt_row_of(path->ray.d, crt_from_bits(path->sampler.b0));
-    *crt_row(wave, CRT_ROW_THROUGHPUT, slot) = path->throughput;
-    *crt_row(wave, CRT_ROW_POINT, slot) = crt_row_of(path->p, path->scatter_pdf);
-    *crt_row(wave, CRT_ROW_REST, slot) =
-        make_vec4(path->scatter_cosine, path->eta_square, path->wavelengths.u, crt_from_bits(path->media));
-    if (crt_has_light_tree(ctx)) *crt_row(wave, CRT_ROW_SIDE, slot) = crt_row_of(path->side, 0.0f);
-}
-
-CRT_FN void crt_store_first_hit(const CrtWave *wave, u32 slot, const CrtFirstHit *first) {
-    *crt_row(wave, CRT_ROW_ALBEDO, slot) = first->albedo;
-    *crt_row(wave, CRT_ROW_NORMAL, slot) = crt_row_of(first->normal, first->depth);
-    *crt_row(wave, CRT_ROW_PRIMITIVE, slot) = splat4(crt_from_bits(first->primitive));
-}
-
 /* The random numbers of the slot's sample, as its path left them. */
 CRT_FN CrtSampler crt_load_sampler(const CrtContext *ctx, const CrtWave *wave, u32 slot) {
     CRT_GLOBAL const CrtScene *scene = ctx->scene;
@@ -179,29 +148,72 @@ CRT_FN CrtRay crt_load_path_ray(const CrtWave *wave, u32 slot) {
 }
 
 CRT_FN u32 crt_load_depth(const CrtWave *wave, u32 slot) {
-    return crt_bits(V4W(*crt_row(wave, CRT_ROW_ORIGIN, slot))) & 0x1fffffffu;
+    return crt_depth_of_word(crt_bits(V4W(*crt_row(wave, CRT_ROW_ORIGIN, slot))));
 }
 
-/* Written in place, as crt_path_begin does. */
+/* CRT_PACK_… makes a row of `path`, CRT_UNPACK_… reads `path` from a row. */
+#define CRT_PACK_V4(member) path->member
+#define CRT_PACK_V3(member, LANE) crt_row_of(path->member, CRT_PACK_##LANE)
+#define CRT_PACK_F4(X, Y, Z, W) make_vec4(CRT_PACK_##X, CRT_PACK_##Y, CRT_PACK_##Z, CRT_PACK_##W)
+#define CRT_PACK_F1(LANE) splat4(CRT_PACK_##LANE)
+#define CRT_PACK_F32(member) path->member
+#define CRT_PACK_U32(member) crt_from_bits(path->member)
+#define CRT_PACK_WORD crt_from_bits(crt_path_word(path))
+#define CRT_PACK_NUMBERS crt_from_bits(path->sampler.b0)
+#define CRT_PACK_UNUSED 0.0f
+#define CRT_UNPACK_V4(member) path->member = row;
+#define CRT_UNPACK_V3(member, LANE) path->member = crt_row_vector(row); lane = V4W(row); CRT_UNPACK_##LANE
+#define CRT_UNPACK_F4(X, Y, Z, W)                                     \
+    lane = V4X(row); CRT_UNPACK_##X lane = V4Y(row); CRT_UNPACK_##Y   \
+    lane = V4Z(row); CRT_UNPACK_##Z lane = V4W(row); CRT_UNPACK_##W
+#define CRT_UNPACK_F1(LANE) lane = V4X(row); CRT_UNPACK_##LANE
+#define CRT_UNPACK_F32(member) path->member = lane;
+#define CRT_UNPACK_U32(member) path->member = crt_bits(lane);
+#define CRT_UNPACK_WORD crt_set_path_word(path, crt_bits(lane));
+#define CRT_UNPACK_NUMBERS path->sampler = crt_load_sampler(ctx, wave, slot);
+#define CRT_UNPACK_UNUSED
+#define CRT_STORE_ROW(ROW, DECLARATIONS, LANES) *crt_row(wave, CRT_ROW_##ROW, slot) = CRT_PACK_##LANES;
+#define CRT_STORE_IN_TREE(ROW, DECLARATIONS, LANES) \
+    if (crt_has_light_tree(ctx)) *crt_row(wave, CRT_ROW_##ROW, slot) = CRT_PACK_##LANES;
+#define CRT_LOAD_ROW(ROW, DECLARATIONS, LANES)                   \
+    {                                                            \
+        const vec4 row = *crt_row(wave, CRT_ROW_##ROW, slot);    \
+        CRT_UNPACK_##LANES                                       \
+    }
+#define CRT_LOAD_IN_TREE(ROW, DECLARATIONS, LANES)               \
+    if (crt_has_light_tree(ctx)) {                               \
+        const vec4 row = *crt_row(wave, CRT_ROW_##ROW, slot);    \
+        CRT_UNPACK_##LANES                                       \
+    }
+#define CRT_NO_ROW(ROW, DECLARATIONS, LANES)
+
+/* The rows that crt_shade changes, but for the radiance. */
+CRT_FN void crt_store_vertex(const CrtContext *ctx, const CrtWave *wave, u32 slot, const CrtPath *path) {
+    CRT_PATH_STATE(CRT_STORE_ROW, CRT_STORE_IN_TREE, CRT_NO_ROW, CRT_NO_ROW)
+}
+
+CRT_FN void crt_store_first_hit(const CrtWave *wave, u32 slot, const CrtPath *path) {
+    CRT_PATH_STATE(CRT_NO_ROW, CRT_NO_ROW, CRT_NO_ROW, CRT_STORE_ROW)
+}
+
+/* All rows of a sample that begins. */
+CRT_FN void crt_store_begin(const CrtContext *ctx, const CrtWave *wave, u32 slot, const CrtPath *path) {
+    crt_store_vertex(ctx, wave, slot, path);
+    CRT_PATH_STATE(CRT_NO_ROW, CRT_NO_ROW, CRT_STORE_ROW, CRT_NO_ROW)
+    if (crt_wave_has_first_hit(ctx)) crt_store_first_hit(wave, slot, path);
+}
+
+/* All but the first hit, which only the film needs. Written in place, as crt_path_begin does. */
 CRT_FN void crt_load_path(const CrtContext *ctx, const CrtWave *wave, u32 slot, CrtPath *path) {
-    const vec4 point = *crt_row(wave, CRT_ROW_POINT, slot);
-    const vec4 rest = *crt_row(wave, CRT_ROW_REST, slot);
-    const u32 word = crt_bits(V4W(*crt_row(wave, CRT_ROW_ORIGIN, slot)));
-    path->ray = crt_load_path_ray(wave, slot);
-    path->sampler = crt_load_sampler(ctx, wave, slot);
-    path->wavelengths = crt_load_wavelengths(wave, slot);
-    path->hero = crt_hero_lane(CRT_HAS(DISPERSION) ? word >> 29 & 3u : 0u);
-    path->throughput = *crt_row(wave, CRT_ROW_THROUGHPUT, slot);
-    path->radiance = *crt_row(wave, CRT_ROW_RADIANCE, slot);
-    path->scatter_pdf = V4W(point);
-    path->scatter_cosine = V4X(rest);
-    path->p = crt_row_vector(point);
-    if (crt_has_light_tree(ctx)) path->side = crt_row_vector(*crt_row(wave, CRT_ROW_SIDE, slot));
-    path->eta_square = V4Y(rest);
-    path->depth = word & 0x1fffffffu;
-    path->alone = word >> 31 != 0u;
+    f32 lane;
+    CRT_PATH_STATE(CRT_LOAD_ROW, CRT_LOAD_IN_TREE, CRT_LOAD_ROW, CRT_NO_ROW)
+    path->ray.reach = CRT_INFINITY;
     path->met = CRT_HAS(MIX) ? crt_bits(V4Z(*crt_row(wave, CRT_ROW_HIT_IDS, slot))) : CRT_NONE;
-    path->media = crt_bits(V4W(rest));
+}
+
+CRT_FN void crt_load_first_hit(const CrtWave *wave, u32 slot, CrtPath *path) {
+    f32 lane;
+    CRT_PATH_STATE(CRT_NO_ROW, CRT_NO_ROW, CRT_NO_ROW, CRT_LOAD_ROW)
 }
 
 /* Numbers of a state that were taken while tracing. */

@@ -18,13 +18,7 @@ CRT_FN void crt_wave_add(const CrtContext *ctx, const CrtWave *wave, u32 slot, C
     CrtPath *path = &work->path;
     path->radiance = *crt_row(wave, CRT_ROW_RADIANCE, slot);
     path->wavelengths = crt_load_wavelengths(wave, slot);
-    if (crt_wave_has_first_hit(ctx)) {
-        const vec4 normal = *crt_row(wave, CRT_ROW_NORMAL, slot);
-        path->first.albedo = *crt_row(wave, CRT_ROW_ALBEDO, slot);
-        path->first.normal = crt_row_vector(normal);
-        path->first.depth = V4W(normal);
-        path->first.primitive = crt_bits(V4X(*crt_row(wave, CRT_ROW_PRIMITIVE, slot)));
-    }
+    if (crt_wave_has_first_hit(ctx)) crt_load_first_hit(wave, slot, path);
     crt_add_sample(ctx, work, crt_to_xyz(ctx, path->wavelengths, path->radiance));
 }
 
@@ -55,10 +49,7 @@ CRT_FN int crt_wave_next_sample(const CrtContext *ctx, const CrtWave *wave, u32 
         return 0;
     }
     crt_begin_sample(ctx, &work);
-    crt_store_vertex(ctx, wave, slot, &work.path);
-    *crt_row(wave, CRT_ROW_RADIANCE, slot) = splat4(0.0f);
-    *crt_row(wave, CRT_ROW_WAVELENGTHS, slot) = work.path.wavelengths.position;
-    if (crt_wave_has_first_hit(ctx)) crt_store_first_hit(wave, slot, &work.path.first);
+    crt_store_begin(ctx, wave, slot, &work.path);
     return 1;
 }
 
@@ -225,7 +216,7 @@ CRT_FN void crt_wave_shade(const CrtContext *ctx, const CrtWave *wave, u32 slot)
     u32 state = alive ? 0u : CRT_WAVE_ENDED;
     *crt_row(wave, CRT_ROW_RADIANCE, slot) = path.radiance;
     if (alive) crt_store_vertex(ctx, wave, slot, &path);
-    if (first) crt_store_first_hit(wave, slot, &path.first);
+    if (first) crt_store_first_hit(wave, slot, &path);
     if (CRT_HAS(NEE) && shadow.pending) {
         state |= CRT_WAVE_ASKED;
         *crt_row(wave, CRT_ROW_SHADOW_ORIGIN, slot) = crt_row_of(shadow.ray.o, shadow.ray.reach);

@@ -7,35 +7,15 @@
 #define CRT_SHADE_H
 
 #include "kernel/camera/camera.h"
-#include "kernel/film/film.h"
 #include "kernel/lights/light_tree.h"
 #include "kernel/lights/point_light.h"
 #include "kernel/lights/shape_light.h"
 #include "kernel/materials/composition.h"
 #include "kernel/materials/medium.h"
 #include "kernel/materials/normal_map.h"
+#include "kernel/transport/path_state.h"
 
 CRT_KERNEL_BEGIN
-
-typedef struct CrtPath {
-    CrtRay ray;
-    CrtSampler sampler;
-    CrtWavelengths wavelengths;
-    vec4 hero;        /* 1 in the lane of the hero wavelength, 0 elsewhere */
-    vec4 throughput;
-    vec4 radiance;
-    f32 scatter_pdf;  /* of the direction that led here; 0: camera or delta, no light sampling competes */
-    f32 scatter_cosine; /* crt_scatter_cosine of that direction, where scatter_pdf is above 0 */
-    vec3 p;           /* where it was scattered: a clearance off the ray's origin */
-    vec3 side;        /* for the tree of lights: the normal there (crt_scattering_side) */
-    f32 eta_square;   /* product of squared relative indices crossed: roulette must not see the n² of being
-                         inside glass */
-    u32 depth;        /* scattering events so far */
-    int alone;        /* only the hero wavelength is alive */
-    u32 met;          /* material that the ray has found a mix to be of (passing.h); or CRT_NONE */
-    u32 media;        /* around the ray where it begins (medium.h) */
-    CrtFirstHit first;
-} CrtPath;
 
 /* Written in place: a path that is returned is copied in wide words, which wait for its narrow stores. */
 CRT_FN void crt_path_begin(const CrtContext *ctx, CrtPath *path, u32 x, u32 y, u64 sample) {
@@ -47,11 +27,8 @@ CRT_FN void crt_path_begin(const CrtContext *ctx, CrtPath *path, u32 x, u32 y, u
     path->ray = crt_camera_ray(ctx, &path->sampler, pixel_x, pixel_y);
     path->wavelengths = crt_sample_wavelengths(ctx, crt_sample_1d(&path->sampler, CRT_DIM_WAVELENGTH));
     path->hero = make_vec4(1.0f, 0.0f, 0.0f, 0.0f);
-    if (CRT_HAS(DISPERSION) && CRT_IN_MASK(scene->features, DISPERSION)) {
-        const u32 lane = crt_sample_bits(&path->sampler, CRT_DIM_HERO) >> 30;
-        path->hero = make_vec4(lane == 0u ? 1.0f : 0.0f, lane == 1u ? 1.0f : 0.0f, lane == 2u ? 1.0f : 0.0f,
-                               lane == 3u ? 1.0f : 0.0f);
-    }
+    if (CRT_HAS(DISPERSION) && CRT_IN_MASK(scene->features, DISPERSION))
+        path->hero = crt_hero_lane(crt_sample_bits(&path->sampler, CRT_DIM_HERO) >> 30);
     path->throughput = splat4(1.0f);
     path->radiance = splat4(0.0f);
     path->scatter_pdf = 0.0f;

@@ -1,0 +1,79 @@
+/*
+ * path_state.h: what a path carries from vertex to vertex, and how that is packed into rows of 16 bytes
+ * where a schedule keeps it in memory.
+ *
+ * CRT_PATH_STATE(VERTEX, TREE, BEGIN, FIRST) calls, for each row, one of these with (ROW, declarations,
+ * lanes). Which one says when the row changes:
+ *
+ *   VERTEX  at each vertex
+ *   TREE    at each vertex, in scenes with a tree of lights
+ *   BEGIN   where a sample begins; shade.h and shadow rays add to its radiance
+ *   FIRST   at the first vertex, in scenes with AOVs
+ *
+ * `declarations` are the members of CrtPath that the row holds, or begins to hold. `lanes` says which
+ * members lie in the four lanes of the row: V4 is one vec4; V3 a vec3 and another lane; F4 four lanes; F1
+ * one lane. A lane is an F32 or U32 member, WORD (crt_path_word), NUMBERS (what the sampler must remember)
+ * or UNUSED.
+ */
+#ifndef CRT_PATH_STATE_H
+#define CRT_PATH_STATE_H
+
+#include "kernel/film/film.h"
+#include "kernel/geometry/ray.h"
+
+CRT_KERNEL_BEGIN
+
+/*
+ *   depth           scattering events so far
+ *   hero            1 in the lane of the hero wavelength, 0 elsewhere
+ *   alone           only the hero wavelength is alive
+ *   p               where the path was scattered: a clearance off the ray's origin
+ *   scatter_pdf     of the direction that led here; 0: camera or delta, no light sampling competes
+ *   scatter_cosine  crt_scatter_cosine of that direction, where scatter_pdf is above 0
+ *   eta_square      product of squared relative indices crossed: roulette must not see the n² of being
+ *                   inside glass
+ *   media           around the ray where it begins (medium.h)
+ *   side            the normal at p (crt_scattering_side)
+ */
+#define CRT_PATH_STATE(VERTEX, TREE, BEGIN, FIRST)                                              \
+    VERTEX(ORIGIN, CrtRay ray; u32 depth; vec4 hero; int alone;, V3(ray.o, WORD))               \
+    VERTEX(DIRECTION, CrtSampler sampler;, V3(ray.d, NUMBERS))                                  \
+    VERTEX(THROUGHPUT, vec4 throughput;, V4(throughput))                                        \
+    BEGIN(RADIANCE, vec4 radiance;, V4(radiance))                                               \
+    BEGIN(WAVELENGTHS, CrtWavelengths wavelengths;, V4(wavelengths.position))                   \
+    VERTEX(POINT, vec3 p; f32 scatter_pdf;, V3(p, F32(scatter_pdf)))                            \
+    VERTEX(REST, f32 scatter_cosine; f32 eta_square; u32 media;,                                \
+           F4(F32(scatter_cosine), F32(eta_square), F32(wavelengths.u), U32(media)))            \
+    TREE(SIDE, vec3 side;, V3(side, UNUSED))                                                    \
+    FIRST(ALBEDO, CrtFirstHit first;, V4(first.albedo))                                         \
+    FIRST(NORMAL, , V3(first.normal, F32(first.depth)))                                         \
+    FIRST(PRIMITIVE, , F1(U32(first.primitive)))
+
+#define CRT_PATH_MEMBERS(ROW, DECLARATIONS, LANES) DECLARATIONS
+typedef struct CrtPath {
+    CRT_PATH_STATE(CRT_PATH_MEMBERS, CRT_PATH_MEMBERS, CRT_PATH_MEMBERS, CRT_PATH_MEMBERS)
+    u32 met; /* material that the ray has found a mix to be of (passing.h); or CRT_NONE */
+} CrtPath;
+
+CRT_FN vec4 crt_hero_lane(u32 lane) {
+    return make_vec4(lane == 0u ? 1.0f : 0.0f, lane == 1u ? 1.0f : 0.0f, lane == 2u ? 1.0f : 0.0f,
+                     lane == 3u ? 1.0f : 0.0f);
+}
+
+/* Depth, hero wavelength and `alone` in one word. */
+CRT_FN u32 crt_path_word(const CrtPath *path) {
+    u32 word = path->depth | (path->alone ? 0x80000000u : 0u);
+    if (CRT_HAS(DISPERSION))
+        word |= (u32)(V4Y(path->hero) + 2.0f * V4Z(path->hero) + 3.0f * V4W(path->hero)) << 29;
+    return word;
+}
+CRT_FN u32 crt_depth_of_word(u32 word) { return word & 0x1fffffffu; }
+CRT_FN void crt_set_path_word(CrtPath *path, u32 word) {
+    path->depth = crt_depth_of_word(word);
+    path->hero = crt_hero_lane(CRT_HAS(DISPERSION) ? word >> 29 & 3u : 0u);
+    path->alone = word >> 31 != 0u;
+}
+
+CRT_KERNEL_END
+
+#endif
