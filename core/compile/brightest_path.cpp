@@ -1,7 +1,8 @@
 #include "compile/brightest_path.h"
 
 #include "kernel/geometry/slots.h"
-#include "kernel/transport/shade.h"
+#include "kernel/materials/composition.h"
+#include "kernel/transport/direct_light.h"
 
 #include <algorithm>
 #include <cmath>
