@@ -143,7 +143,7 @@ def navigation(site, decisions):
     titled = [{title(file.read_text("utf-8")).replace(": ", " ", 1): f"decisions/{file.name}"}
               for file in decisions]
     return [{"crt": ["index.md"]}, {"Gallery": "gallery.md"},
-            {"Manual": [{"Install": "install.md"}, {"Getting started": "start.md"},
+            {"Manual": [{"Install": "install.md"}, {"Tutorial": "tutorial.md"},
                         {"Scene files": "scene.md"}, {"Live view": "view.md"},
                         {"Errors of images": "error.md"}, {"Python": "python.md"},
                         {"Scenes of Mitsuba and pbrt": "import.md"}, {"Many machines": "cluster.md"},
