@@ -200,7 +200,7 @@ def measure(program, arguments):
     )
     results.table(["scene", "Mitsuba over crt, mean", "worst tile", "excess", "verdict"], rows)
     results.claim(
-        "crt and Mitsuba 3 converge to the same images",
+        "crt and Mitsuba 3 agree where their models are the same",
         [f"{renders} renders of each scene by each program, {samples} samples per pixel, seeds of their "
          f"own; "
          f"crt on `{backend}`, Mitsuba {mi.__version__} (`{arguments.variant}`). Images agree when two "

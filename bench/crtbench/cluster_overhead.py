@@ -1,7 +1,7 @@
 """What a Dask cluster on one machine costs beside one plain render of the same samples: wall and processor
 seconds, in turn, and whether the bits are the same. The same processes that render an equal share each,
 of which no film is sent or added, show what processes cost without crt.distributed. Prints one table;
-nothing is written.
+--write replaces its section of docs/results.
 
 Where a machine's speed changes from minute to minute, so do the ratios of wall times. The last column does
 not: of the processors' time in that very run, what was not spent on rendering parts, to what was. It leaves
@@ -16,7 +16,9 @@ GPUs' time."""
 
 import contextlib
 import os
+import shlex
 import statistics
+import sys
 import time
 
 import dask
@@ -25,6 +27,8 @@ import distributed
 import crt
 import crt.distributed
 from crt import cluster_work
+
+from . import section
 
 QUIET = {"distributed.worker.profile.enabled": False, "distributed.admin.tick.interval": "1s",
          "distributed.admin.system-monitor.interval": "10s",
@@ -106,6 +110,7 @@ def options(parser):
     parser.add_argument("--runs", type=int, default=3)
     parser.add_argument("--backend", default="embree")
     parser.add_argument("--gpus", action="store_true", help="a GPU for each worker")
+    parser.add_argument("--write", action="store_true", help="replace the section of docs/results")
 
 
 def alone(arguments):
@@ -142,17 +147,27 @@ def alone(arguments):
                       f"{found[name][-1][2]:.2%} not of renders, load {os.getloadavg()[0]:.1f}",
                       result.report.get("distributed", "") if result else "", flush=True)
     same = (films["one render"].xyz == films["Dask"].xyz).all()
-    print(f"\n{samples} samples of {arguments.resolution}² pixels, {arguments.workers} workers; "
-          f"{'the same bits' if same else 'OTHER BITS'}\n\n"
-          "| | wall s | processor s | not of renders |\n|---|---|---|---|")
+    rows = []
     for name, runs in found.items():
         wall, processor, lost = zip(*runs)
         columns = [f"{statistics.median(c):.1f} ({min(c):.1f} – {max(c):.1f})" for c in (wall, processor)]
-        print(f"| {name} | {' | '.join(columns)} "
-              f"| {statistics.median(lost):.1%} ({min(lost):.1%} – {max(lost):.1%}) |")
-    for name in ("one render", "processes"):
-        ratios = [statistics.median(d[i] / p[i] for p, d in zip(found[name], found["Dask"]))
-                  for i in range(2)]
-        print(f"| Dask to {name}: median of the ratios of neighbours "
-              f"| {ratios[0]:.3f} | {ratios[1]:.3f} | |")
+        rows.append([name, *columns, f"{statistics.median(lost):.1%} ({min(lost):.1%} – {max(lost):.1%})"])
+    ratios = [[statistics.median(d[i] / p[i] for p, d in zip(found[name], found["Dask"])) for i in range(2)]
+              for name in ("one render", "processes")]
+    rows += [[f"Dask to {name}, median of neighbours", f"{wall:.3f}", f"{processor:.3f}", ""]
+             for name, (wall, processor) in zip(("one render", "processes"), ratios)]
+    what = (f"{samples} samples of the scene at {arguments.resolution} × {arguments.resolution} pixels, "
+            f"{arguments.workers} workers; {'the same bits' if same else 'OTHER BITS'}.")
+    head = ["", "wall s", "processor s", "not rendering"]
+    print("\n" + what + "\n\n" + "\n".join(section.table(head, rows)))
+    if arguments.write:
+        name = "cluster-overhead-gpus" if arguments.gpus else "cluster-overhead"
+        share = f"takes {ratios[0][0]:.2f} of the time of"
+        title = (f"Dask with {arguments.workers} GPUs {share} one GPU" if arguments.gpus
+                 else f"Dask on one machine {share} one render")
+        line = section.source("bench/run " + shlex.join(sys.argv[1:]), section.commit(), section.today(),
+                              section.processor())
+        text = (f"{what} *Processes*: the same, without films sent or added. *Not rendering*: time of "
+                "the processors, or GPUs, that was not spent on rendering, over the time that was.")
+        section.replace(section.page_of(name), name, section.section(title, line, text, head, rows))
     return 0 if same else 1

@@ -31,6 +31,8 @@ from crt import cluster_work
 from crt.pickling import film_bytes, film_of
 from crt.sample_ranges import Missing
 
+from . import section
+
 
 # One worker looks at its process 50 times a second; a thousand need not look at the same few.
 QUIET = {"distributed.worker.profile.enabled": False, "distributed.admin.system-monitor.interval": "60s",
@@ -254,8 +256,10 @@ def alone(arguments):
         before = processor_seconds_of(client)
         ideal, real, report = simulate(client, arguments.seconds, speeds)
         busy = [after - earlier for after, earlier in zip(processor_seconds_of(client), before)]
-    print(f"\n| workers | ideal s | real s | overhead | parts | sums | processor s: client | scheduler "
-          f"| workers | load |\n|{'---|' * 10}\n| {arguments.workers} | {ideal:.1f} | {real:.1f} "
-          f"| {real / ideal - 1:.1%} | {report['parts']} | {report['merges']} | {busy[0]:.1f} "
-          f"| {busy[1]:.1f} | {busy[2]:.1f} | {os.getloadavg()[0]:.1f} |", flush=True)
+    head = ["workers", "ideal s", "real s", "lost s", "parts", "sums", "processor s: client", "scheduler",
+            "workers", "load"]
+    lost = f"{real - ideal:.1f} ({real / ideal - 1:.1%})"
+    row = [f"{arguments.workers:,}", f"{ideal:.1f}", f"{real:.1f}", lost, report["parts"], report["merges"],
+           *(f"{seconds:.1f}" for seconds in busy), f"{os.getloadavg()[0]:.1f}"]
+    print("\n" + "\n".join(section.table(head, [row])), flush=True)
     return 0

@@ -14,6 +14,7 @@ import textwrap
 
 from . import section
 from .command import REPOSITORY
+from .section import processor, processor_name
 
 JSON_TEXT_COLUMNS = 80  # A key and its indent stand before it.
 
@@ -188,15 +189,6 @@ def provenance(program):
                                     if "embree" in statuses else ""),
             "cpu": processor_name(), "threads": os.cpu_count(), "memory_gb": round(memory_kb / 1e6, 1),
             "gpu": gpus[0] if gpus else None, "os": operating_system(), "backends": backends}
-
-
-def processor_name():
-    match = re.search(r"model name\s*:\s*(.*)", pathlib.Path("/proc/cpuinfo").read_text())
-    return match[1] if match else platform.processor()
-
-
-def processor():
-    return f"{processor_name()}, {os.cpu_count()} threads"
 
 
 def operating_system():

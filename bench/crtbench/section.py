@@ -3,7 +3,9 @@
 moves the section."""
 
 import datetime
+import os
 import pathlib
+import platform
 import re
 import subprocess
 import textwrap
@@ -49,6 +51,15 @@ def commit():
     changed = [line for line in git("status", "--porcelain").splitlines()
                if not line[3:].startswith("docs/results/")]
     return git("rev-parse", "HEAD").strip()[:10] + ("+" if changed else "")
+
+
+def processor_name():
+    match = re.search(r"model name\s*:\s*(.*)", pathlib.Path("/proc/cpuinfo").read_text())
+    return match[1] if match else platform.processor()
+
+
+def processor():
+    return f"{processor_name()}, {os.cpu_count()} threads"
 
 
 def marks(name):

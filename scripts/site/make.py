@@ -22,6 +22,7 @@ import stage  # noqa: E402
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = stage.ROOT
 TITLE = re.compile(r"^# (.*)$", re.MULTILINE)
+STATUS = re.compile(r"^Status: (.*)\.$", re.MULTILINE)
 
 
 def say(text):
@@ -44,6 +45,18 @@ def package(build, work):
     return folder.parent
 
 
+def decision_index(decisions):
+    """The page that lists them, with the status that each must have."""
+    lines = ["# Decisions", "", "Why crt is built as it is.", "", "| | decision | status |", "|---|---|---|"]
+    for file in decisions:
+        text = file.read_text("utf-8")
+        status = STATUS.search(text)
+        if not status:
+            sys.exit(f"== error: {file.name} has no line 'Status: …'")
+        lines.append(f"| [{file.stem[:4]}]({file.name}) | {title(text).partition(': ')[2]} | {status[1]} |")
+    return "\n".join(lines) + "\n"
+
+
 def add_documents(site, program):
     """README.md, docs/ and what else is prose. The manual is what the program says today."""
     manual = subprocess.run([program, "schema", "--markdown"], stdout=subprocess.PIPE, text=True,
@@ -58,10 +71,7 @@ def add_documents(site, program):
         if file.is_relative_to(ROOT / "docs") and file.suffix in stage.ASSETS:
             site.copy(file)
     decisions = sorted((ROOT / "docs/decisions").glob("*.md"))
-    rows = [f"| [{file.stem[:4]}]({file.name}) | {title(file.read_text('utf-8')).partition(': ')[2]} |"
-            for file in decisions]
-    site.write("decisions/index.md", "# Decisions\n\nWhy it is built so: question, decision, why, what was "
-               "not chosen.\n\n| | decision |\n|---|---|\n" + "\n".join(rows) + "\n")
+    site.write("decisions/index.md", decision_index(decisions))
     for page in sorted((HERE / "pages").iterdir()):
         site.write(page.name.removesuffix(".in"), page.read_text("utf-8"))
     (site.docs / "assets").mkdir(exist_ok=True)
@@ -143,7 +153,7 @@ def navigation(site, decisions):
     titled = [{title(file.read_text("utf-8")).replace(": ", " ", 1): f"decisions/{file.name}"}
               for file in decisions]
     return [{"crt": ["index.md"]}, {"Gallery": "gallery.md"},
-            {"Manual": [{"Install": "install.md"}, {"Getting started": "start.md"},
+            {"Manual": [{"Install": "install.md"}, {"Tutorial": "tutorial.md"},
                         {"Scene files": "scene.md"}, {"Live view": "view.md"},
                         {"Errors of images": "error.md"}, {"Python": "python.md"},
                         {"Scenes of Mitsuba and pbrt": "import.md"}, {"Many machines": "cluster.md"},

@@ -72,6 +72,12 @@ class Navigation(unittest.TestCase):
                         + sorted((ROOT / "docs").glob("*.md"))}
         self.assertEqual(expected - pages, set())
 
+    def test_every_decision_is_listed_with_its_status(self):
+        decisions = sorted((ROOT / "docs/decisions").glob("*.md"))
+        index = make.decision_index(decisions)
+        for file in decisions:
+            self.assertRegex(index, rf"\| \[{file.stem[:4]}\]\({file.name}\) \| .+ \| (accept|replac)ed")
+
 
 def leaves(tree):
     """The texts in lists and in values of dicts."""

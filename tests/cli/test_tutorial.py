@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""docs/start.md keeps its promise: the files on the page are scenes, each shows something, and every command
-on the page works.
+"""docs/tutorial.md keeps its promise: the files on the page are scenes, each shows something, and every
+command on the page works.
 
-    test_start.py CRT CONFIG_DIR FAKE_PLUGIN_DIR [unittest arguments]
+    test_tutorial.py CRT CONFIG_DIR FAKE_PLUGIN_DIR [unittest arguments]
 """
 
 import pathlib
@@ -12,7 +12,8 @@ import shlex
 import harness
 from harness import LightTest, read_bytes
 
-PAGE = pathlib.Path(__file__).resolve().parents[2] / "docs/start.md"
+PAGE = pathlib.Path(__file__).resolve().parents[2] / "docs/tutorial.md"
+README = PAGE.parents[1] / "README.md"
 FILE = re.compile(r"^```\w+\n# (\S+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 COMMAND = re.compile(r"^    crt (.*)$", re.MULTILINE)
 SMALL = ("--set", "film.resolution=[48, 32]")
@@ -25,7 +26,7 @@ def pixels(path):
     return re.fullmatch(rb"P6\s+\d+ \d+\s+255\s(.*)", read_bytes(path), re.DOTALL)[1]
 
 
-class Start(LightTest):
+class Tutorial(LightTest):
     def setUp(self):
         super().setUp()
         text = PAGE.read_text("utf-8")
@@ -33,6 +34,11 @@ class Start(LightTest):
         self.commands = [shlex.split(line) for line in COMMAND.findall(text)]
         for name, content in self.files.items():
             self.write(name, f"# {name}\n{content}")
+
+    def test_the_first_scene_has_twelve_lines(self):
+        scene = self.files["ball.yaml"]
+        self.assertEqual(len(scene.splitlines()), 12)
+        self.assertIn(scene, README.read_text("utf-8"))
 
     def test_scenes_show_something(self):
         scenes = [name for name in self.files if name.endswith(".yaml")]
