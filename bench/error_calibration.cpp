@@ -14,6 +14,7 @@
 #include "base/statistics.h"
 #include "film/error_estimate.h"
 #include "film/pooled_variance.h"
+#include "render/brightest_path.h"
 #include "scene/yaml/scene_yaml.h"
 
 #include <fmt/format.h>

@@ -5,6 +5,7 @@
 #include "base/log.h"
 #include "base/stage.h"
 #include "base/stopwatch.h"
+#include "render/brightest_path.h"
 #include "render/light_checks.h"
 #include "render/outputs.h"
 #include "scene/missing_light.h"

@@ -6,6 +6,7 @@
 #include "base/stage.h"
 #include "base/stopwatch.h"
 #include "compile/change_view.h"
+#include "render/brightest_path.h"
 #include "view/silence.h"
 
 #include <algorithm>

@@ -10,6 +10,7 @@
 #include "judge/stats/color_difference.h"
 #include "judge/stats/flip.h"
 #include "judge/stats/metrics.h"
+#include "render/brightest_path.h"
 #include "render/report.h"
 
 #include <fmt/format.h>

@@ -10,6 +10,7 @@
 #include "film/luminance_error.h"
 #include "image/image_io.h"
 #include "judge/converge/files.h"
+#include "render/brightest_path.h"
 #include "render/output_guard.h"
 #include "render/sampling.h"
 #include "render/session.h"

@@ -1,4 +1,4 @@
-#include "compile/brightest_path.h"
+#include "render/brightest_path.h"
 
 #include "kernel/path.h"
 
