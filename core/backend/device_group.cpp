@@ -44,10 +44,6 @@ std::string listOf(const std::vector<CrtDevice>& devices) {
     return text;
 }
 
-bool isAllPixels(const RenderRange& range) {
-    return range.rectangle == std::array<std::uint32_t, 4>{0, 0, 0, 0};
-}
-
 std::uint64_t samplesOf(const std::vector<RenderRange>& ranges) {
     std::uint64_t samples = 0;
     for (const RenderRange& range : ranges) samples += range.sample_count;
@@ -266,15 +262,14 @@ void DeviceGroup::setWindow(const CompiledScene& scene) {
     if (working().empty()) readmitThoseWithoutRoom();
     for (const auto& member : members_) {
         for (const RenderRange& range : member->unread)
-            if (isAllPixels(range)) member->countSamples(-range.sample_count, window_pixels_, film_pixels_);
+            member->countSamples(-range.sample_count, window_pixels_, film_pixels_);
         if (member->works()) member->keepCounts();
     }
     loadScene(scene, {});
 }
 
-/// Who renders what: of ranges of all pixels each device a share as large as it is fast. A film knows
-/// samples that every pixel has, and so the rectangles of a range must meet on one device.
-std::vector<DeviceGroup::Assignment> DeviceGroup::divide(const std::vector<RenderRange>& ranges) {
+/// Gives each device a share of `ranges` in proportion to its speed.
+std::vector<DeviceGroup::Assignment> DeviceGroup::divide(std::vector<RenderRange> ranges) {
     const std::vector<Member*> there = working();
     std::vector<Assignment> work;
     std::vector<double> weights;
@@ -292,17 +287,11 @@ std::vector<DeviceGroup::Assignment> DeviceGroup::divide(const std::vector<Rende
                                                          : member->score * per_score);
     }
 
-    std::vector<RenderRange> divisible;
-    for (const RenderRange& range : ranges)
-        if (isAllPixels(range))
-            divisible.push_back(range);
-        else
-            work.front().ranges.push_back(range);
-    const std::vector<std::uint64_t> counts = shareOut(samplesOf(divisible), weights);
+    const std::vector<std::uint64_t> counts = shareOut(samplesOf(ranges), weights);
     std::size_t next = 0;
     for (std::size_t i = 0; i < work.size(); ++i)
         for (std::uint64_t left = counts[i]; left > 0;) {
-            RenderRange& open = divisible[next];
+            RenderRange& open = ranges[next];
             RenderRange taken = open;
             taken.sample_count = std::min(left, open.sample_count);
             work[i].ranges.push_back(taken);
@@ -321,7 +310,7 @@ std::vector<RenderRange> DeviceGroup::collectLost() {
         if (member->works()) continue;
         lost.insert(lost.end(), member->unread.begin(), member->unread.end());
         for (const RenderRange& range : std::exchange(member->unread, {}))
-            if (isAllPixels(range)) member->countSamples(-range.sample_count, window_pixels_, film_pixels_);
+            member->countSamples(-range.sample_count, window_pixels_, film_pixels_);
     }
     return lost;
 }
@@ -346,8 +335,7 @@ void DeviceGroup::renderAll(std::vector<RenderRange> ranges, const std::function
                 const auto count = static_cast<double>(range.sample_count);
                 // Noted first: what is lost when it fails is this range, too.
                 member.unread.push_back(range);
-                if (isAllPixels(range))
-                    member.countSamples(range.sample_count, window_pixels_, film_pixels_);
+                member.countSamples(range.sample_count, window_pixels_, film_pixels_);
                 member.integrator->render(range, [&](double done) {
                     shown.part(member.index, (before + done * count) / all);
                     return false;  // A range is always finished.
@@ -371,7 +359,7 @@ void DeviceGroup::render(const RenderRange& range, const std::function<void(doub
         return false;
     });
     only.share.seconds += std::chrono::duration<double>(Clock::now() - start).count();
-    if (isAllPixels(range)) only.countSamples(range.sample_count, window_pixels_, film_pixels_);
+    only.countSamples(range.sample_count, window_pixels_, film_pixels_);
 }
 
 void DeviceGroup::readFilm(Film& film) {

@@ -1,6 +1,5 @@
 #include "backend/integrator.h"
 
-#include "backend/coverage.h"
 #include "backend/kernel_source.h"
 #include "base/error.h"
 #include "base/listener.h"
@@ -58,7 +57,7 @@ struct Integrator::Impl {
     bool has_scene = false;
     std::uint32_t width = 0, height = 0, channels = 0;
     bool has_primitives = false;
-    Coverage coverage;
+    SampleRanges samples;  ///< In the backend's film.
     /// A cancelled or failed render leaves part of a range in the backend's film: nothing can be read until
     /// the next setScene.
     bool film_is_whole = true;
@@ -238,7 +237,7 @@ struct Integrator::Impl {
         view.counts = film.counts.data();
         view.primitives = film.primitives.empty() ? nullptr : film.primitives.data();
         check(call("read_film", [&] { return table.read_film(table.state, &view); }));
-        film.samples = coverage.ranges();
+        film.samples = samples;
         checkContents(film);
     }
 
@@ -321,7 +320,7 @@ void Integrator::setScene(const CompiledScene& scene, const std::function<void(d
     self.height = scene.height;
     self.channels = scene.channels;
     self.has_primitives = (scene.aovs & kAovPrimitive) != 0;
-    self.coverage = Coverage(scene.width, scene.height);
+    self.samples = {};
     self.film_is_whole = true;
     self.has_scene = true;
 }
@@ -332,27 +331,18 @@ bool Integrator::render(const RenderRange& range, const std::function<bool(doubl
     if (!self.film_is_whole)
         throw Error(ErrorKind::Internal,
                     "render was called after a cancelled or failed one without setScene between");
-    Rectangle r = range.rectangle;
-    if (r == Rectangle{0, 0, 0, 0}) r = {0, 0, self.width, self.height};
-    if (r[0] >= r[2] || r[1] >= r[3] || r[2] > self.width || r[3] > self.height) {
-        throw Error(ErrorKind::Internal,
-                    fmt::format("rectangle {},{} {},{} is empty or leaves the film of {}×{}", r[0], r[1],
-                                r[2], r[3], self.width, self.height));
-    }
     if (range.sample_count > std::numeric_limits<std::uint64_t>::max() - range.first_sample) {
         throw Error(ErrorKind::Usage, fmt::format("{} samples from sample {} on exceed 64 bits",
                                                   range.sample_count, range.first_sample));
     }
     if (range.sample_count == 0) return true;
-    Coverage coverage = self.coverage;
-    coverage.add({range.first_sample, range.first_sample + range.sample_count}, r);
+    SampleRanges samples = self.samples;
+    samples.add({range.first_sample, range.first_sample + range.sample_count});
 
     CrtRenderRange request{};
     request.struct_size = sizeof(request);
-    request.x0 = r[0];
-    request.y0 = r[1];
-    request.x1 = r[2];
-    request.y1 = r[3];
+    request.x1 = self.width;
+    request.y1 = self.height;
     request.first_sample = range.first_sample;
     request.sample_count = range.sample_count;
 
@@ -362,7 +352,7 @@ bool Integrator::render(const RenderRange& range, const std::function<bool(doubl
     if (self.progress_error) std::rethrow_exception(std::exchange(self.progress_error, nullptr));
     if (status == CRT_CANCELLED && self.cancelled) return false;
     self.check(status);
-    self.coverage = std::move(coverage);
+    self.samples = std::move(samples);
     self.film_is_whole = true;
     // Asked to stop just as the last sample was done: the range is complete and counts.
     return true;
@@ -374,9 +364,6 @@ void Integrator::readFilm(Film& film) {
     if (!self.film_is_whole)
         throw Error(ErrorKind::Internal,
                     "the film holds part of a cancelled or failed range and cannot be read");
-    if (!self.coverage.isWhole())
-        throw Error(ErrorKind::Internal,
-                    "the film cannot be read: the rectangles rendered do not cover it yet");
     const FilmShape& shape = film.shape();
     if (shape.width != self.width || shape.height != self.height || shape.channels != self.channels ||
         ((shape.aovs & kAovPrimitive) != 0) != self.has_primitives) {

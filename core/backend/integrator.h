@@ -25,9 +25,8 @@ struct IntegratorOptions {
 /// What a scene for this backend need not bring.
 CompileOptions compileOptionsFor(const LoadedBackend& backend);
 
+/// Samples of all pixels.
 struct RenderRange {
-    std::array<std::uint32_t, 4> rectangle{
-        0, 0, 0, 0};  ///< x0, y0, x1, y1 within the crop window; all zero: all of it.
     std::uint64_t first_sample = 0;
     std::uint64_t sample_count = 0;
 };
