@@ -2,12 +2,12 @@
 
 #include "base/listener.h"
 #include "base/log.h"
+#include "base/stopwatch.h"
 #include "base/words.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
 #include <exception>
 #include <mutex>
@@ -16,8 +16,6 @@
 
 namespace crt {
 namespace {
-
-using Clock = std::chrono::steady_clock;
 
 /// Of what a backend counts from zero on with every scene.
 void addCounts(const CrtBackendReport& from, CrtBackendReport& to) {
@@ -328,7 +326,7 @@ void DeviceGroup::renderAll(std::vector<RenderRange> ranges, const std::function
         SharedProgress shown(members_.size(), progress);
         const double all = static_cast<double>(std::max<std::uint64_t>(samplesOf(ranges), 1));
         inParallel(busy, [&](Member& member) {
-            const Clock::time_point start = Clock::now();
+            const Stopwatch rendering;
             const std::vector<RenderRange>& own = of[member.index]->ranges;
             double before = 0;
             for (const RenderRange& range : own) {
@@ -342,7 +340,7 @@ void DeviceGroup::renderAll(std::vector<RenderRange> ranges, const std::function
                 });
                 before += count;
             }
-            const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
+            const double seconds = rendering.seconds();
             member.share.seconds += seconds;
             member.samples_per_second = before / std::max(seconds, 1e-9);
         });
@@ -353,12 +351,12 @@ void DeviceGroup::renderAll(std::vector<RenderRange> ranges, const std::function
 void DeviceGroup::render(const RenderRange& range, const std::function<void(double)>& progress) {
     if (members_.size() > 1) return renderAll({range}, progress);
     Member& only = *members_.front();
-    const Clock::time_point start = Clock::now();
+    const Stopwatch rendering;
     only.integrator->render(range, [&](double done) {
         if (progress) progress(done);
         return false;
     });
-    only.share.seconds += std::chrono::duration<double>(Clock::now() - start).count();
+    only.share.seconds += rendering.seconds();
     only.countSamples(range.sample_count, window_pixels_, film_pixels_);
 }
 

@@ -288,8 +288,6 @@ CompileOptions compileOptionsFor(const LoadedBackend& backend) {
     return {.accelerator_reach = acceleratorReach(backend)};
 }
 
-CompileOptions Integrator::compileOptions() const { return compileOptionsFor(impl_->backend); }
-
 void Integrator::setScene(const CompiledScene& scene, const std::function<void(double)>& progress) {
     Impl& self = *impl_;
     const std::uint64_t lacking = scene.features & ~self.backend.table->features;

@@ -41,8 +41,6 @@ public:
     Integrator(Integrator&&) noexcept;
     Integrator& operator=(Integrator&&) noexcept;
 
-    CompileOptions compileOptions() const;
-
     /// The scene must outlive nothing: what is needed is copied. Clears the film. `progress` gets [0,1] from
     /// backends that tell how far they are.
     void setScene(const CompiledScene& scene, const std::function<void(double)>& progress = {});

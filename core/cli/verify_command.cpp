@@ -4,6 +4,7 @@
 #include "base/log.h"
 #include "base/parallel.h"
 #include "base/standard_output.h"
+#include "base/stopwatch.h"
 #include "base/unit_text.h"
 #include "cli/commands.h"
 #include "cli/report_page.h"
@@ -17,7 +18,6 @@
 #include <unistd.h>
 
 #include <charconv>
-#include <chrono>
 #include <cstdlib>
 #include <filesystem>
 #include <memory>
@@ -102,10 +102,8 @@ public:
 
     void before(const Case& next, std::size_t index) {
         if (!shown_) return;
-        const double seconds =
-            std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
-        fmt::print(stderr, "\r\033[K  {} of {}, {} so far: {} {}", index + 1, cases_, clockText(seconds),
-                   next.id, next.title);
+        fmt::print(stderr, "\r\033[K  {} of {}, {} so far: {} {}", index + 1, cases_,
+                   clockText(stopwatch_.seconds()), next.id, next.title);
         std::fflush(stderr);
     }
     void clear() const {
@@ -115,7 +113,7 @@ public:
 private:
     std::size_t cases_;
     bool shown_;
-    std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+    Stopwatch stopwatch_;
 };
 
 void writeWhole(const std::filesystem::path& path, const std::string& text) {

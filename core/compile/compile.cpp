@@ -2,6 +2,7 @@
 
 #include "base/log.h"
 #include "base/stage.h"
+#include "base/stopwatch.h"
 #include "compile/accelerator.h"
 #include "compile/blob_writer.h"
 #include "compile/camera_media.h"
@@ -26,7 +27,6 @@
 #include "kernel/layout.h"
 
 #include <algorithm>
-#include <chrono>
 #include <limits>
 #include <optional>
 
@@ -103,7 +103,7 @@ void warnOfUnseenLights(const Scene& scene, const kernel::CrtScene& header) {
 /// of the blob. Nothing is changed by two of them.
 CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const CompileOptions& options) {
     const Stage stage("compiling the scene");
-    const auto start = std::chrono::steady_clock::now();
+    const Stopwatch compiling;
     const FlatScene flat = flattenScene(scene);
     kernel::CrtScene header = compileSettings(scene, flat, aovs);
     BlobWriter blob;
@@ -244,7 +244,7 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
     out.hash = sceneIdentity(out.data(), flat.positions);
     out.build_seconds = accelerator.build_seconds;
     out.compile_seconds =
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() - out.build_seconds;
+        compiling.seconds() - out.build_seconds;
     return out;
 }
 

@@ -2,6 +2,7 @@
 #include "film/resolve.h"
 
 #include "backend/loader.h"
+#include "base/stopwatch.h"
 #include "compile/compile.h"
 #include "film/error_estimate.h"
 #include "film/luminance_error.h"
@@ -16,7 +17,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
@@ -25,11 +25,6 @@
 
 namespace crt::converge {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-double secondsSince(Clock::time_point start) {
-    return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 /// The reference's luminances, one for each pixel.
 std::vector<float> spread(const Reference& reference, std::size_t pixels) {
@@ -173,18 +168,18 @@ void Contestant::renderPicture(std::uint32_t replicate, std::uint64_t samples) {
 /// What only the very first sample pays, such as an OpenCL driver that makes machine code late, belongs to
 /// the start and not to a replicate.
 void Contestant::warmUp(const CompiledScene& compiled) {
-    const Clock::time_point start = Clock::now();
+    const Stopwatch start;
     session_->render({.first_sample = 0, .sample_count = 1});
-    configuration_.stages.first_sample = secondsSince(start);
+    configuration_.stages.first_sample = start.seconds();
     start_seconds_ += configuration_.stages.first_sample;
     session_->setScene(compiled);
 }
 
 void Contestant::prepare() {
-    const Clock::time_point setup = Clock::now();
+    const Stopwatch setup;
     const CompiledScene compiled = session_->compile(scene_);
     session_->setScene(compiled);
-    start_seconds_ += secondsSince(setup);
+    start_seconds_ += setup.seconds();
     if (configuration_.width == 0) describe(compiled);
     warmUp(compiled);
     start_waits_ = true;
@@ -224,16 +219,16 @@ bool Contestant::replicate(std::uint32_t replicate, std::uint64_t most_samples, 
     scene_.sampler.seed = seed_ + 1 + replicate;
     const CompiledScene compiled = session_->compile(scene_);
     session_->setScene(compiled);
-    const Clock::time_point start = Clock::now();
+    const Stopwatch start;
 
     const CrtBackendReport before = session_->report();
     const bool exploring = replicate == 0;
     double wall = 0;
     for (std::uint64_t done = 0, next = 1; done < most_samples; next *= 2) {
         if (stop()) return false;
-        const Clock::time_point step = Clock::now();
+        const Stopwatch step;
         session_->render({.first_sample = done, .sample_count = next - done});
-        const double step_seconds = secondsSince(step);
+        const double step_seconds = step.seconds();
         wall += step_seconds;
         done = next;
         if (exploring) samples_reached_ = done;
@@ -241,7 +236,7 @@ bool Contestant::replicate(std::uint32_t replicate, std::uint64_t most_samples, 
         const Film film = session_->film();
         // The next doubling takes as long as all before it, and its look some more.
         const bool last =
-            done * 2 > most_samples || (exploring && secondsSince(start) + 2.2 * step_seconds > seconds);
+            done * 2 > most_samples || (exploring && start.seconds() + 2.2 * step_seconds > seconds);
         Row row = look(film, replicate, last);
         const CrtBackendReport now = session_->report();
         row.render_wall_seconds = wall;
@@ -256,7 +251,7 @@ bool Contestant::replicate(std::uint32_t replicate, std::uint64_t most_samples, 
         if (last) break;
     }
     configuration_.stages.render_wall = wall;
-    seconds_of_last_ = secondsSince(start) + (start_waits_ ? start_seconds_ : 0);
+    seconds_of_last_ = start.seconds() + (start_waits_ ? start_seconds_ : 0);
     start_waits_ = false;
     return true;
 }

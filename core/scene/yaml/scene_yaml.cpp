@@ -3,6 +3,7 @@
 
 #include "base/input_file.h"
 #include "base/log.h"
+#include "base/stopwatch.h"
 #include "scene/import/import.h"
 #include "scene/length_unit.h"
 #include "scene/scene_limits.h"
@@ -23,7 +24,6 @@
 
 #include <algorithm>
 #include <bit>
-#include <chrono>
 #include <cmath>
 #include <deque>
 #include <filesystem>
@@ -251,7 +251,7 @@ void readScene(const YamlNode& root, Diagnostics& out, SceneFiles& files, GltfFi
 Scene parse(const std::string& yaml, const std::string& name, const std::string& path,
             const std::vector<SceneOverride>& overrides, std::string* composed, SceneFiles files,
             GltfFiles gltf = {}, std::unique_ptr<LoadedMesh> model_mesh = {}) {
-    const auto start = std::chrono::steady_clock::now();
+    const Stopwatch reading;
     Scene scene;
     scene.file = name;
     scene.input_bytes = yaml.size();
@@ -271,7 +271,7 @@ Scene parse(const std::string& yaml, const std::string& name, const std::string&
         if (file != name || isModel(name)) scene.input_bytes += std::filesystem::file_size(file, unknown);
     // A scene of a program, which may still put meshes into it.
     if (scene.files_read.empty()) scene.input_bytes = 0;
-    scene.parse_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    scene.parse_seconds = reading.seconds();
     return scene;
 }
 
@@ -316,15 +316,14 @@ SceneOverride parseOverride(const std::string& text) {
 Scene loadScene(const std::string& path, const std::vector<SceneOverride>& overrides,
                 std::string* composed) {
     if (isModel(path)) {
-        const auto start = std::chrono::steady_clock::now();
+        const Stopwatch reading;
         GltfFiles gltf;
         ImportedModel model = importModel(gltf, path);
         SceneFiles files(std::filesystem::path(path).parent_path().string());
         files.note(path);
         Scene scene = parse(model.scene, path, {}, overrides, composed, std::move(files), std::move(gltf),
                             std::move(model.mesh));
-        const std::chrono::duration<double> passed = std::chrono::steady_clock::now() - start;
-        scene.parse_seconds = passed.count();
+        scene.parse_seconds = reading.seconds();
         return scene;
     }
     const std::string other = otherRendererOf(path);
