@@ -14,6 +14,7 @@
 #include "base/statistics.h"
 #include "film/error_estimate.h"
 #include "film/pooled_variance.h"
+#include "render/brightest_path.h"
 #include "scene/yaml/scene_yaml.h"
 
 #include <fmt/format.h>
@@ -66,7 +67,7 @@ public:
         ranges_.add(range);
     }
     Film film() {
-        Film film({compiled_.width, compiled_.height, compiled_.channels, compiled_.aovs});
+        Film film(filmShapeOf(compiled_));
         integrator_.readFilm(film);
         film.samples = ranges_;
         return film;

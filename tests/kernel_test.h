@@ -2,6 +2,7 @@
 /// chi-squared.
 #pragma once
 
+#include "base/vec3d.h"
 #include "catch.h"
 #include "compile/compile.h"
 #include "kernel/schedule/pixel.h"
@@ -15,6 +16,9 @@
 namespace kernel_test {
 
 using namespace crt::kernel;
+using crt::cross;
+using crt::dot;
+using crt::length;
 
 /// Seeded by the test, so that a failure comes back. Not std::uniform_real_distribution, whose numbers
 /// depend on the library.
@@ -48,21 +52,10 @@ inline vec3 toFloat(const crt::Vec3d& v) {
     return make_vec3(static_cast<f32>(v[0]), static_cast<f32>(v[1]), static_cast<f32>(v[2]));
 }
 inline crt::Vec3d toDouble(vec3 v) { return {v.x, v.y, v.z}; }
-inline crt::Vec3d minus(const crt::Vec3d& a, const crt::Vec3d& b) {
-    return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
-}
-inline crt::Vec3d plus(const crt::Vec3d& a, const crt::Vec3d& b) {
-    return {a[0] + b[0], a[1] + b[1], a[2] + b[2]};
-}
-inline crt::Vec3d times(const crt::Vec3d& a, double s) { return {a[0] * s, a[1] * s, a[2] * s}; }
-inline double dot(const crt::Vec3d& a, const crt::Vec3d& b) {
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-inline double length(const crt::Vec3d& a) { return std::sqrt(dot(a, a)); }
+inline crt::Vec3d minus(const crt::Vec3d& a, const crt::Vec3d& b) { return crt::operator-(a, b); }
+inline crt::Vec3d plus(const crt::Vec3d& a, const crt::Vec3d& b) { return crt::operator+(a, b); }
+inline crt::Vec3d times(const crt::Vec3d& a, double s) { return crt::operator*(a, s); }
 inline crt::Vec3d unit(const crt::Vec3d& a) { return times(a, 1 / length(a)); }
-inline crt::Vec3d cross(const crt::Vec3d& a, const crt::Vec3d& b) {
-    return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
 /// A unit vector in float, as near to v as rounding once allows.
 inline vec3 unitFloat(const crt::Vec3d& v) { return toFloat(unit(v)); }
 
@@ -93,7 +86,7 @@ inline u32 unhash(u32 x) {
 inline CrtContext contextOf(const crt::CompiledScene& compiled) {
     CrtContext ctx{};
     ctx.blob = compiled.data();
-    ctx.scene = reinterpret_cast<const CrtScene*>(compiled.data());
+    ctx.scene = &compiled.header();
     return ctx;
 }
 

@@ -3,7 +3,7 @@
 
 #include "captured_log.h"
 #include "base/error.h"
-#include "compile/brightest_path.h"
+#include "render/brightest_path.h"
 #include "film/film_record.h"
 #include "scene/yaml/scene_yaml.h"
 

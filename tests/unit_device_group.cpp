@@ -114,14 +114,6 @@ TEST_CASE("the devices of a group report their progress together", "[device_grou
     CHECK(seen.back() == Approx(1));
 }
 
-TEST_CASE("rectangles that cover the window make one film, wherever they were rendered", "[device_group]") {
-    Group group("all");
-    group.devices.render({.rectangle = {0, 0, 6, 1}, .sample_count = 8});
-    group.devices.render({.rectangle = {0, 1, 2, 4}, .sample_count = 8});
-    group.devices.render({.rectangle = {2, 1, 6, 4}, .sample_count = 8});
-    checkSame(group.film(), filmOfOne(8));
-}
-
 // Fails when what only the failed device had is not rendered again, or what was read of it before twice.
 TEST_CASE("a device that fails is dropped, and the others render what it had", "[device_group]") {
     const char* const broken = GENERATE("0", "1");

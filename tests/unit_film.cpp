@@ -7,6 +7,7 @@
 #include "film/resolve.h"
 #include "image/image_io.h"
 #include "image/image_metadata.h"
+#include "scene/scene.h"
 
 #include <algorithm>
 #include <cmath>

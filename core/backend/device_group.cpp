@@ -2,12 +2,12 @@
 
 #include "base/listener.h"
 #include "base/log.h"
+#include "base/stopwatch.h"
 #include "base/words.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
 #include <exception>
 #include <mutex>
@@ -16,8 +16,6 @@
 
 namespace crt {
 namespace {
-
-using Clock = std::chrono::steady_clock;
 
 /// Of what a backend counts from zero on with every scene.
 void addCounts(const CrtBackendReport& from, CrtBackendReport& to) {
@@ -44,8 +42,8 @@ std::string listOf(const std::vector<CrtDevice>& devices) {
     return text;
 }
 
-bool isAllPixels(const RenderRange& range) {
-    return range.rectangle == std::array<std::uint32_t, 4>{0, 0, 0, 0};
+std::uint64_t pixelsOf(const CompiledScene& scene) {
+    return std::uint64_t{scene.header().width} * scene.header().height;
 }
 
 std::uint64_t samplesOf(const std::vector<RenderRange>& ranges) {
@@ -241,7 +239,7 @@ void DeviceGroup::loadScene(const CompiledScene& scene, const std::function<void
         member.integrator->setScene(scene, [&](double done) { shown.part(member.index, done * part); });
         member.has_scene = true;
     });
-    window_pixels_ = std::uint64_t{scene.width} * scene.height;
+    window_pixels_ = pixelsOf(scene);
 }
 
 void DeviceGroup::readmitThoseWithoutRoom() {
@@ -251,7 +249,7 @@ void DeviceGroup::readmitThoseWithoutRoom() {
 
 void DeviceGroup::setScene(const CompiledScene& scene, const std::function<void(double)>& progress) {
     readmitThoseWithoutRoom();
-    film_pixels_ = std::uint64_t{scene.width} * scene.height;
+    film_pixels_ = pixelsOf(scene);
     for (const auto& member : members_) {
         member->share.samples = 0;
         member->share.seconds = 0;
@@ -266,15 +264,14 @@ void DeviceGroup::setWindow(const CompiledScene& scene) {
     if (working().empty()) readmitThoseWithoutRoom();
     for (const auto& member : members_) {
         for (const RenderRange& range : member->unread)
-            if (isAllPixels(range)) member->countSamples(-range.sample_count, window_pixels_, film_pixels_);
+            member->countSamples(-range.sample_count, window_pixels_, film_pixels_);
         if (member->works()) member->keepCounts();
     }
     loadScene(scene, {});
 }
 
-/// Who renders what: of ranges of all pixels each device a share as large as it is fast. A film knows
-/// samples that every pixel has, and so the rectangles of a range must meet on one device.
-std::vector<DeviceGroup::Assignment> DeviceGroup::divide(const std::vector<RenderRange>& ranges) {
+/// Gives each device a share of `ranges` in proportion to its speed.
+std::vector<DeviceGroup::Assignment> DeviceGroup::divide(std::vector<RenderRange> ranges) {
     const std::vector<Member*> there = working();
     std::vector<Assignment> work;
     std::vector<double> weights;
@@ -292,17 +289,11 @@ std::vector<DeviceGroup::Assignment> DeviceGroup::divide(const std::vector<Rende
                                                          : member->score * per_score);
     }
 
-    std::vector<RenderRange> divisible;
-    for (const RenderRange& range : ranges)
-        if (isAllPixels(range))
-            divisible.push_back(range);
-        else
-            work.front().ranges.push_back(range);
-    const std::vector<std::uint64_t> counts = shareOut(samplesOf(divisible), weights);
+    const std::vector<std::uint64_t> counts = shareOut(samplesOf(ranges), weights);
     std::size_t next = 0;
     for (std::size_t i = 0; i < work.size(); ++i)
         for (std::uint64_t left = counts[i]; left > 0;) {
-            RenderRange& open = divisible[next];
+            RenderRange& open = ranges[next];
             RenderRange taken = open;
             taken.sample_count = std::min(left, open.sample_count);
             work[i].ranges.push_back(taken);
@@ -321,7 +312,7 @@ std::vector<RenderRange> DeviceGroup::collectLost() {
         if (member->works()) continue;
         lost.insert(lost.end(), member->unread.begin(), member->unread.end());
         for (const RenderRange& range : std::exchange(member->unread, {}))
-            if (isAllPixels(range)) member->countSamples(-range.sample_count, window_pixels_, film_pixels_);
+            member->countSamples(-range.sample_count, window_pixels_, film_pixels_);
     }
     return lost;
 }
@@ -339,22 +330,21 @@ void DeviceGroup::renderAll(std::vector<RenderRange> ranges, const std::function
         SharedProgress shown(members_.size(), progress);
         const double all = static_cast<double>(std::max<std::uint64_t>(samplesOf(ranges), 1));
         inParallel(busy, [&](Member& member) {
-            const Clock::time_point start = Clock::now();
+            const Stopwatch rendering;
             const std::vector<RenderRange>& own = of[member.index]->ranges;
             double before = 0;
             for (const RenderRange& range : own) {
                 const auto count = static_cast<double>(range.sample_count);
                 // Noted first: what is lost when it fails is this range, too.
                 member.unread.push_back(range);
-                if (isAllPixels(range))
-                    member.countSamples(range.sample_count, window_pixels_, film_pixels_);
+                member.countSamples(range.sample_count, window_pixels_, film_pixels_);
                 member.integrator->render(range, [&](double done) {
                     shown.part(member.index, (before + done * count) / all);
                     return false;  // A range is always finished.
                 });
                 before += count;
             }
-            const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
+            const double seconds = rendering.seconds();
             member.share.seconds += seconds;
             member.samples_per_second = before / std::max(seconds, 1e-9);
         });
@@ -365,13 +355,13 @@ void DeviceGroup::renderAll(std::vector<RenderRange> ranges, const std::function
 void DeviceGroup::render(const RenderRange& range, const std::function<void(double)>& progress) {
     if (members_.size() > 1) return renderAll({range}, progress);
     Member& only = *members_.front();
-    const Clock::time_point start = Clock::now();
+    const Stopwatch rendering;
     only.integrator->render(range, [&](double done) {
         if (progress) progress(done);
         return false;
     });
-    only.share.seconds += std::chrono::duration<double>(Clock::now() - start).count();
-    if (isAllPixels(range)) only.countSamples(range.sample_count, window_pixels_, film_pixels_);
+    only.share.seconds += rendering.seconds();
+    only.countSamples(range.sample_count, window_pixels_, film_pixels_);
 }
 
 void DeviceGroup::readFilm(Film& film) {

@@ -47,8 +47,7 @@ public:
     /// The same scene once more, with another window of its film: what devices have done by now still
     /// counts in shares() and report(), and what was not read is lost.
     void setWindow(const CompiledScene& scene);
-    /// Adds a range to the films of the devices. `progress` gets [0,1]. A range of all pixels is divided; a
-    /// rectangle goes to one device.
+    /// Divides a range among the devices. `progress` gets [0,1].
     void render(const RenderRange& range, const std::function<void(double)>& progress = {});
     /// Adds what all films hold to `film`, as Integrator::readFilm does. Where there are several devices the
     /// host keeps a copy of each one's film: what a device loses that fails later is not in it.
@@ -68,7 +67,7 @@ private:
     void readmitThoseWithoutRoom();
     void inParallel(const std::vector<Member*>& members, const std::function<void(Member&)>& work,
                     bool may_fail = true);
-    std::vector<Assignment> divide(const std::vector<RenderRange>& ranges);
+    std::vector<Assignment> divide(std::vector<RenderRange> ranges);
     std::vector<RenderRange> collectLost();
     void renderAll(std::vector<RenderRange> ranges, const std::function<void(double)>& progress);
 

@@ -1,6 +1,5 @@
 #include "backend/integrator.h"
 
-#include "backend/coverage.h"
 #include "backend/kernel_source.h"
 #include "base/error.h"
 #include "base/listener.h"
@@ -56,9 +55,8 @@ struct Integrator::Impl {
     bool created = false;
 
     bool has_scene = false;
-    std::uint32_t width = 0, height = 0, channels = 0;
-    bool has_primitives = false;
-    Coverage coverage;
+    FilmShape shape;
+    SampleRanges samples;  ///< In the backend's film.
     /// A cancelled or failed render leaves part of a range in the backend's film: nothing can be read until
     /// the next setScene.
     bool film_is_whole = true;
@@ -212,18 +210,20 @@ struct Integrator::Impl {
     /// that is none, once in a checkpoint, would stay there for good.
     void checkContents(const Film& part) const {
         const std::uint64_t asked = part.samples.count();
+        const std::size_t values = shape.channels * std::size_t{2};
         for (std::size_t pixel = 0; pixel < part.counts.size(); ++pixel) {
-            const double* const sums = &part.sums[pixel * channels * 2];
+            const double* const sums = &part.sums[pixel * values];
             bool finite = true;  // Without a way out of the loop, so that it becomes one of vectors: films
                                  // have hundreds of millions of sums.
-            for (std::size_t i = 0; i < channels * std::size_t{2}; ++i) finite &= std::isfinite(sums[i]);
+            for (std::size_t i = 0; i < values; ++i) finite &= std::isfinite(sums[i]);
             if (finite && part.counts[pixel] <= asked) continue;
             const std::string what =
                 finite ? fmt::format("has {} samples and {} were asked for", part.counts[pixel], asked)
                        : "is not a number";
-            throw Error(ErrorKind::Internal, fmt::format("backend '{}' broke the contract: pixel {},{} of "
-                                                         "its film {}; what was rendered before is kept",
-                                                         backend.name, pixel % width, pixel / width, what));
+            throw Error(ErrorKind::Internal,
+                        fmt::format("backend '{}' broke the contract: pixel {},{} of "
+                                    "its film {}; what was rendered before is kept",
+                                    backend.name, pixel % shape.width, pixel / shape.width, what));
         }
     }
 
@@ -231,14 +231,14 @@ struct Integrator::Impl {
     void fill(Film& film) {
         CrtFilmView view{};
         view.struct_size = sizeof(view);
-        view.width = width;
-        view.height = height;
-        view.channels = channels;
+        view.width = shape.width;
+        view.height = shape.height;
+        view.channels = shape.channels;
         view.sums = film.sums.data();
         view.counts = film.counts.data();
         view.primitives = film.primitives.empty() ? nullptr : film.primitives.data();
         check(call("read_film", [&] { return table.read_film(table.state, &view); }));
-        film.samples = coverage.ranges();
+        film.samples = samples;
         checkContents(film);
     }
 
@@ -289,11 +289,14 @@ CompileOptions compileOptionsFor(const LoadedBackend& backend) {
     return {.accelerator_reach = acceleratorReach(backend)};
 }
 
-CompileOptions Integrator::compileOptions() const { return compileOptionsFor(impl_->backend); }
+FilmShape filmShapeOf(const CompiledScene& compiled) {
+    const kernel::CrtScene& header = compiled.header();
+    return {header.width, header.height, header.channels, header.aovs, compiled.spectral_channels};
+}
 
 void Integrator::setScene(const CompiledScene& scene, const std::function<void(double)>& progress) {
     Impl& self = *impl_;
-    const std::uint64_t lacking = scene.features & ~self.backend.table->features;
+    const std::uint64_t lacking = scene.header().features & ~self.backend.table->features;
     if (lacking != 0) {
         throw Error(ErrorKind::Backend, fmt::format("backend '{}' cannot render this scene: it lacks {}",
                                                     self.backend.name, featureNames(lacking)));
@@ -317,11 +320,8 @@ void Integrator::setScene(const CompiledScene& scene, const std::function<void(d
         show, "set_scene", [&] { return self.table.set_scene(self.table.state, &blob); });
     if (self.progress_error) std::rethrow_exception(std::exchange(self.progress_error, nullptr));
     self.check(status);
-    self.width = scene.width;
-    self.height = scene.height;
-    self.channels = scene.channels;
-    self.has_primitives = (scene.aovs & kAovPrimitive) != 0;
-    self.coverage = Coverage(scene.width, scene.height);
+    self.shape = filmShapeOf(scene);
+    self.samples = {};
     self.film_is_whole = true;
     self.has_scene = true;
 }
@@ -332,27 +332,18 @@ bool Integrator::render(const RenderRange& range, const std::function<bool(doubl
     if (!self.film_is_whole)
         throw Error(ErrorKind::Internal,
                     "render was called after a cancelled or failed one without setScene between");
-    Rectangle r = range.rectangle;
-    if (r == Rectangle{0, 0, 0, 0}) r = {0, 0, self.width, self.height};
-    if (r[0] >= r[2] || r[1] >= r[3] || r[2] > self.width || r[3] > self.height) {
-        throw Error(ErrorKind::Internal,
-                    fmt::format("rectangle {},{} {},{} is empty or leaves the film of {}×{}", r[0], r[1],
-                                r[2], r[3], self.width, self.height));
-    }
     if (range.sample_count > std::numeric_limits<std::uint64_t>::max() - range.first_sample) {
         throw Error(ErrorKind::Usage, fmt::format("{} samples from sample {} on exceed 64 bits",
                                                   range.sample_count, range.first_sample));
     }
     if (range.sample_count == 0) return true;
-    Coverage coverage = self.coverage;
-    coverage.add({range.first_sample, range.first_sample + range.sample_count}, r);
+    SampleRanges samples = self.samples;
+    samples.add({range.first_sample, range.first_sample + range.sample_count});
 
     CrtRenderRange request{};
     request.struct_size = sizeof(request);
-    request.x0 = r[0];
-    request.y0 = r[1];
-    request.x1 = r[2];
-    request.y1 = r[3];
+    request.x1 = self.shape.width;
+    request.y1 = self.shape.height;
     request.first_sample = range.first_sample;
     request.sample_count = range.sample_count;
 
@@ -362,7 +353,7 @@ bool Integrator::render(const RenderRange& range, const std::function<bool(doubl
     if (self.progress_error) std::rethrow_exception(std::exchange(self.progress_error, nullptr));
     if (status == CRT_CANCELLED && self.cancelled) return false;
     self.check(status);
-    self.coverage = std::move(coverage);
+    self.samples = std::move(samples);
     self.film_is_whole = true;
     // Asked to stop just as the last sample was done: the range is complete and counts.
     return true;
@@ -374,12 +365,9 @@ void Integrator::readFilm(Film& film) {
     if (!self.film_is_whole)
         throw Error(ErrorKind::Internal,
                     "the film holds part of a cancelled or failed range and cannot be read");
-    if (!self.coverage.isWhole())
-        throw Error(ErrorKind::Internal,
-                    "the film cannot be read: the rectangles rendered do not cover it yet");
-    const FilmShape& shape = film.shape();
-    if (shape.width != self.width || shape.height != self.height || shape.channels != self.channels ||
-        ((shape.aovs & kAovPrimitive) != 0) != self.has_primitives) {
+    const FilmShape &shape = film.shape(), &own = self.shape;
+    if (shape.width != own.width || shape.height != own.height || shape.channels != own.channels ||
+        ((shape.aovs ^ own.aovs) & kAovPrimitive) != 0) {
         throw Error(ErrorKind::Internal, "readFilm was given a film of another shape than the scene's");
     }
 

@@ -25,9 +25,11 @@ struct IntegratorOptions {
 /// What a scene for this backend need not bring.
 CompileOptions compileOptionsFor(const LoadedBackend& backend);
 
+/// The shape of a film of this scene.
+FilmShape filmShapeOf(const CompiledScene& compiled);
+
+/// Samples of all pixels.
 struct RenderRange {
-    std::array<std::uint32_t, 4> rectangle{
-        0, 0, 0, 0};  ///< x0, y0, x1, y1 within the crop window; all zero: all of it.
     std::uint64_t first_sample = 0;
     std::uint64_t sample_count = 0;
 };
@@ -41,8 +43,6 @@ public:
     ~Integrator();
     Integrator(Integrator&&) noexcept;
     Integrator& operator=(Integrator&&) noexcept;
-
-    CompileOptions compileOptions() const;
 
     /// The scene must outlive nothing: what is needed is copied. Clears the film. `progress` gets [0,1] from
     /// backends that tell how far they are.

@@ -355,9 +355,11 @@ std::vector<CrtDevice> probeDevices(const LoadedBackend& backend) {
     return devices;
 }
 
+std::vector<std::string> knownBackends() { return {std::begin(kKnownBackends), std::end(kKnownBackends)}; }
+
 std::vector<BackendStatus> listBackends() {
     // Known ones first, in the order of preference, then whatever else lies in the directories.
-    std::vector<std::string> names(std::begin(kKnownBackends), std::end(kKnownBackends));
+    std::vector<std::string> names = knownBackends();
     for (const std::string& name : installedBackends()) {
         if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
     }

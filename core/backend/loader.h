@@ -42,7 +42,10 @@ struct BackendStatus {
     bool refused = false;  ///< It was not even opened: others could have written it (code_trust.h).
 };
 
-/// Every backend known (cuda, embree, opencl) or found in the directories, usable or not. Opens each.
+/// The backends of crt, in the order in which `auto` prefers them.
+std::vector<std::string> knownBackends();
+
+/// Every known backend, and every other one found in the directories, usable or not. Opens each.
 std::vector<BackendStatus> listBackends();
 
 struct PassedOver {
@@ -50,7 +53,7 @@ struct PassedOver {
     bool is_absent = false;  ///< Not installed, or for hardware of which nothing is there: as expected.
 };
 
-/// Picks a backend for `auto`: cuda, embree, opencl in that order, the first with a device. `reasons` gets
+/// Picks a backend for `auto`: the first of knownBackends() with a device. `reasons` gets
 /// those passed over.
 LoadedBackend chooseBackend(std::vector<PassedOver>& reasons);
 

@@ -1,5 +1,7 @@
 #include "cli/completion.h"
 
+#include "backend/loader.h"
+
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -9,8 +11,12 @@
 namespace crt {
 namespace {
 
-/// What crt brings; others are typed.
-const std::vector<std::string> kBackends{"auto", "cuda", "embree", "opencl"};
+/// The backends of crt. Users type the names of others.
+std::vector<std::string> backendNames() {
+    std::vector<std::string> names = knownBackends();
+    names.insert(names.begin(), "auto");
+    return names;
+}
 
 std::vector<std::string> namesOf(const Option& option) {
     std::vector<std::string> names;
@@ -45,7 +51,7 @@ std::vector<std::string> commandNames(const std::vector<Command>& commands) {
 std::vector<std::string> wordsOf(const Completion& completion, const std::vector<Command>& commands) {
     switch (completion.kind) {
         case Completion::Kind::Word: return completion.words;
-        case Completion::Kind::Backend: return kBackends;
+        case Completion::Kind::Backend: return backendNames();
         case Completion::Kind::Command: return commandNames(commands);
         default: return {};
     }

@@ -5,6 +5,7 @@
 #include "cli/shared_options.h"
 #include "compile/compile.h"
 #include "film/checkpoint.h"
+#include "render/brightest_path.h"
 #include "render/job.h"
 #include "render/output_guard.h"
 #include "render/outputs.h"

@@ -1,10 +1,10 @@
 #include "compile/accelerator.h"
 
 #include "base/parallel.h"
+#include "base/stopwatch.h"
 #include "kernel/geometry/intersect.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <numeric>
 
@@ -79,7 +79,7 @@ AcceleratorPart compileAccelerator(const Scene& scene, const FlatScene& flat,
     part.without_nodes = part.kind == CRT_ACCELERATOR_BVH &&
                          backendFindsHits(scene.camera, flat.centre, flat.scale_exponent, options);
     if (part.kind == CRT_ACCELERATOR_BVH && !part.without_nodes) {
-        const auto start = std::chrono::steady_clock::now();
+        const Stopwatch building;
         std::vector<TriangleBounds> bounds(count);
         parallelFor(count, kPart, [&](std::size_t first, std::size_t end) {
             for (std::size_t i = first; i < end; ++i) bounds[i] = boundsOf(flat, i);
@@ -87,7 +87,7 @@ AcceleratorPart compileAccelerator(const Scene& scene, const FlatScene& flat,
         Bvh bvh = buildBvh(bounds, CRT_BOX_PADDING);
         part.nodes = std::move(bvh.nodes);
         part.id_of_slot = std::move(bvh.order);
-        part.build_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+        part.build_seconds = building.seconds();
     } else {
         part.id_of_slot.resize(count);
         std::iota(part.id_of_slot.begin(), part.id_of_slot.end(), 0u);

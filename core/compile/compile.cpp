@@ -2,6 +2,7 @@
 
 #include "base/log.h"
 #include "base/stage.h"
+#include "base/stopwatch.h"
 #include "compile/accelerator.h"
 #include "compile/blob_writer.h"
 #include "compile/camera_media.h"
@@ -26,7 +27,6 @@
 #include "kernel/dialect/layout.h"
 
 #include <algorithm>
-#include <chrono>
 #include <limits>
 #include <optional>
 
@@ -77,18 +77,6 @@ std::size_t expectedBytes(const FlatScene& flat, const AcceleratorPart& accelera
            recordsOf(flat, &FlatScene::colors) * sizeof(kernel::CrtVertexColors);
 }
 
-std::vector<const Spectrum*> spectraOf(const Scene& scene, const FlatScene& flat,
-                                       const std::vector<std::uint32_t>& emitting,
-                                       const std::vector<const Material*>& materials,
-                                       const MaterialTables& tables,
-                                       const std::vector<TextureIndex>& textures) {
-    std::vector<const Spectrum*> all = spectraOfLights(scene, flat, emitting);
-    for (const Spectrum* spectrum : spectraOfTextures(scene, textures)) all.push_back(spectrum);
-    for (const Spectrum* spectrum : spectraOfMaterials(materials, tables)) all.push_back(spectrum);
-    if (const Spectrum* environment = spectrumOfEnvironment(scene)) all.push_back(environment);
-    return all;
-}
-
 /// Warns of lights that nothing in the scene can show.
 void warnOfUnseenLights(const Scene& scene, const kernel::CrtScene& header) {
     if (header.point_lights.count == 0 || (header.features & CRT_FEATURE_POINT_LIGHT) != 0) return;
@@ -103,7 +91,7 @@ void warnOfUnseenLights(const Scene& scene, const kernel::CrtScene& header) {
 /// of the blob. Nothing is changed by two of them.
 CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const CompileOptions& options) {
     const Stage stage("compiling the scene");
-    const auto start = std::chrono::steady_clock::now();
+    const Stopwatch compiling;
     const FlatScene flat = flattenScene(scene);
     kernel::CrtScene header = compileSettings(scene, flat, aovs);
     BlobWriter blob;
@@ -141,7 +129,7 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
 
     const std::vector<std::uint32_t> emitting = emittingTriangles(scene, flat);
     const MaterialTables tables = materialTablesOf(used);
-    const SpectrumTable spectra(spectraOf(scene, flat, emitting, used, tables, textures));
+    SpectrumTable spectra;
 
     std::optional<EnvironmentTexels> around;
     if (spectrumOfEnvironment(scene) && scene.environment->dependsOnDirection()) {
@@ -159,12 +147,15 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
         logWarning(
             "the scene has no light: the image will be black "
             "(add emission to an object, lights, or an environment)");
-    const Spectrum* environment = spectrumOfEnvironment(scene);
-    header.environment = environment ? spectra.valueOf(*environment) : CRT_NONE;
 
     TexturePart texture_part = compileTextures(scene, textures, spectra, blob);
     header.textures = blob.append(texture_part.records);
     const MaterialPart materials = compileMaterials(used, tables, spectra, texture_part);
+    // Behind the spectra of all materials.
+    const Spectrum* environment = spectrumOfEnvironment(scene);
+    header.environment = environment ? spectra.valueOf(*environment) : CRT_NONE;
+    if (lights.environment > 0)
+        blob.items<kernel::CrtLight>(header.lights)[lights.environment - 1].radiance = header.environment;
     if (header.textures.count > 0 || (materials.features & CRT_FEATURE_ANISOTROPY) != 0)
         header.uvs = appendOfPrimitives(blob, flat, &FlatScene::uvs);
     if (header.textures.count > 0) header.vertex_colors = appendOfPrimitives(blob, flat, &FlatScene::colors);
@@ -193,7 +184,7 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
     header.media = blob.append(materials.media);
     header.medium_bits = mediumBits(materials.media.size());
     header.compositions = blob.append(compileCompositions(used, texture_part));
-    header.layers = blob.append(compileLayers(used, tables, spectra, texture_part));
+    header.layers = blob.append(materials.layers);
     header.losses = appendLosses(blob, tables.compensations);
 
     header.spectra = blob.append(spectra.floats());
@@ -216,14 +207,9 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
 
     CompiledScene out;
     out.blob = blob.finish(header);
-    findCameraMedia(reinterpret_cast<unsigned char*>(out.blob.data()));
-    markTouchingMedia(reinterpret_cast<unsigned char*>(out.blob.data()));
+    findCameraMedia(out.data());
+    markTouchingMedia(out.data());
     out.size_bytes = out.blob.size() * sizeof(CompiledScene::Line);
-    out.features = header.features;
-    out.width = header.width;
-    out.height = header.height;
-    out.channels = header.channels;
-    out.aovs = header.aovs;
     out.spectral_channels = spectralChannelsOf(scene).count();
     out.triangles = flat.firstShape();
     out.shapes = flat.shapes.size();
@@ -243,17 +229,15 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
     out.left_out = leftOut(scene, header, occluders, accelerator.without_nodes);
     out.hash = sceneIdentity(out.data(), flat.positions);
     out.build_seconds = accelerator.build_seconds;
-    out.compile_seconds =
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() - out.build_seconds;
+    out.compile_seconds = compiling.seconds() - out.build_seconds;
     return out;
 }
 
 /// "'ceiling light'": what the author calls the object of a primitive.
 std::string objectOf(const Scene& scene, const CompiledScene& compiled, std::uint32_t primitive) {
     using namespace kernel;
-    const auto* header = reinterpret_cast<const CrtScene*>(compiled.data());
     std::uint32_t placement =
-        CRT_ARRAY(CrtPrimitive, compiled.data(), header->primitives)[primitive].object &
+        CRT_ARRAY(CrtPrimitive, compiled.data(), compiled.header().primitives)[primitive].object &
         ~CRT_PRIMITIVE_TOUCHES;
     for (const Object& object : scene.objects) {
         if (placement < object.transforms.size())

@@ -1,42 +1,26 @@
 #include "compile/scene_identity.h"
 
+#include "base/byte_hash.h"
 #include "kernel/dialect/bits_version.h"
-
-#include <fmt/format.h>
-
-#define XXH_INLINE_ALL
-#include <xxhash.h>
 
 #include <cstddef>
 #include <cstdint>
-#include <memory>
-#include <new>
 
 namespace crt {
 namespace {
 
 class IdentityHash {
 public:
-    IdentityHash() : state_(XXH3_createState()) {
-        if (!state_) throw std::bad_alloc();
-        XXH3_128bits_reset(state_.get());
-    }
     /// The size goes first: otherwise an item could move from one array to the next unseen.
     void add(const void* items, std::size_t count, std::size_t item_bytes) {
         const std::uint64_t sizes[] = {count, item_bytes};
-        XXH3_128bits_update(state_.get(), sizes, sizeof sizes);
-        if (count > 0) XXH3_128bits_update(state_.get(), items, count * item_bytes);
+        hash_.add(sizes, sizeof sizes);
+        if (count > 0) hash_.add(items, count * item_bytes);
     }
-    std::string digits() const {
-        const XXH128_hash_t hash = XXH3_128bits_digest(state_.get());
-        return fmt::format("{:016x}{:016x}", hash.high64, hash.low64);
-    }
+    std::string digits() const { return hash_.digits128(); }
 
 private:
-    struct Free {
-        void operator()(XXH3_state_t* state) const { XXH3_freeState(state); }
-    };
-    std::unique_ptr<XXH3_state_t, Free> state_;
+    ByteHash hash_;
 };
 
 /// The header without what names accelerators and kernels, and without places in the blob. What is added to

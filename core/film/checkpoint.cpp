@@ -1,6 +1,7 @@
 #include "film/checkpoint.h"
 
 #include "base/atomic_file.h"
+#include "base/byte_hash.h"
 #include "base/input_file.h"
 #include "base/log.h"
 #include "film/film_pack.h"
@@ -8,9 +9,6 @@
 #include <fmt/format.h>
 
 // In the header's inline form, so that nothing has to be linked or found at run time.
-#define XXH_INLINE_ALL
-#include <xxhash.h>
-
 #include <sys/stat.h>
 #include <algorithm>
 #include <array>
@@ -56,27 +54,12 @@ constexpr std::size_t kAfterChecksum = kBeforeChecksum + sizeof(std::uint64_t);
 
 std::uint64_t roundUp8(std::uint64_t bytes) { return (bytes + 7) & ~std::uint64_t{7}; }
 
-class Checksum {
-public:
-    Checksum() : state_(XXH3_createState()) {
-        if (!state_) throw std::bad_alloc();
-        XXH3_64bits_reset(state_.get());
-    }
-    void update(const void* bytes, std::size_t size) { XXH3_64bits_update(state_.get(), bytes, size); }
-    /// The fixed header without the checksum itself.
-    void update(const Header& header) {
-        const auto* bytes = reinterpret_cast<const unsigned char*>(&header);
-        update(bytes, kBeforeChecksum);
-        update(bytes + kAfterChecksum, sizeof(Header) - kAfterChecksum);
-    }
-    std::uint64_t value() const { return XXH3_64bits_digest(state_.get()); }
-
-private:
-    struct Free {
-        void operator()(XXH3_state_t* state) const { XXH3_freeState(state); }
-    };
-    std::unique_ptr<XXH3_state_t, Free> state_;
-};
+/// The fixed header without the checksum itself.
+void addHeader(ByteHash& checksum, const Header& header) {
+    const auto* bytes = reinterpret_cast<const unsigned char*>(&header);
+    checksum.add(bytes, kBeforeChecksum);
+    checksum.add(bytes + kAfterChecksum, sizeof(Header) - kAfterChecksum);
+}
 
 /// Sample ranges, version and record: the part of the header whose size varies.
 std::vector<unsigned char> packTail(const Film& film, const FilmIdentity& identity,
@@ -193,11 +176,11 @@ void writeCheckpoint(const std::string& path, const Film& film, const FilmIdenti
     AtomicFile file(path);  // Where it cannot be written, nothing need be packed.
     const std::vector<unsigned char> packed = packFilm(film);
     header.file_bytes = header.header_bytes + packed.size();
-    Checksum checksum;
-    checksum.update(header);
-    checksum.update(tail.data(), tail.size());
-    checksum.update(packed.data(), packed.size());
-    header.checksum = checksum.value();
+    ByteHash checksum;
+    addHeader(checksum, header);
+    checksum.add(tail.data(), tail.size());
+    checksum.add(packed.data(), packed.size());
+    header.checksum = checksum.digest64();
 
     file.write(&header, sizeof header);
     file.write(tail.data(), tail.size());
@@ -238,18 +221,18 @@ std::pair<Film, FilmIdentity> readCheckpoint(const std::string& path) {
                                  header.width, header.height, kFilmSideMax));
 
     const char* const kBadChecksum = "is damaged: its checksum does not match its content";
-    Checksum checksum;
-    checksum.update(header);
+    ByteHash checksum;
+    addHeader(checksum, header);
     std::vector<unsigned char> tail(header.header_bytes - sizeof(Header));
     readExactly(file.get(), path, tail.data(), tail.size());
-    checksum.update(tail.data(), tail.size());
+    checksum.add(tail.data(), tail.size());
 
     std::vector<unsigned char> packed;
     if (header.format_version > kCheckpointVersionUnpacked) {
         packed.resize(header.file_bytes - header.header_bytes);
         readExactly(file.get(), path, packed.data(), packed.size());
-        checksum.update(packed.data(), packed.size());
-        if (checksum.value() != header.checksum) refuse(path, kBadChecksum);
+        checksum.add(packed.data(), packed.size());
+        if (checksum.digest64() != header.checksum) refuse(path, kBadChecksum);
     }
 
     std::optional<FilmRecord> record;
@@ -271,7 +254,7 @@ std::pair<Film, FilmIdentity> readCheckpoint(const std::string& path) {
     const auto read_section = [&](auto& values) {
         const std::size_t bytes = values.size() * sizeof(values[0]);
         readExactly(file.get(), path, values.data(), bytes);
-        checksum.update(values.data(), bytes);
+        checksum.add(values.data(), bytes);
         return bytes;
     };
     if (header.format_version > kCheckpointVersionUnpacked) {
@@ -282,7 +265,7 @@ std::pair<Film, FilmIdentity> readCheckpoint(const std::string& path) {
         const std::size_t primitive_bytes = read_section(film.primitives);
         std::vector<unsigned char> padding(roundUp8(primitive_bytes) - primitive_bytes);
         read_section(padding);
-        if (checksum.value() != header.checksum) refuse(path, kBadChecksum);
+        if (checksum.digest64() != header.checksum) refuse(path, kBadChecksum);
     }
 
     // From here on the file is what a crt wrote; what is checked still is what could only be a bug of that

@@ -49,7 +49,7 @@ enum class ErrorKnowledge {
     Known,   ///< Estimated, with an interval.
     Bound,   ///< Of one Sobol sequence: the true error is smaller, by an unknown factor.
     NotYet,  ///< So few paths carry the noise, or brighter ones than those that were met are so likely
-             ///< (error_tail.h, compile/brightest_path.h), that neither the estimate nor an interval can be
+             ///< (error_tail.h, path_facts.h), that neither the estimate nor an interval can be
              ///< trusted.
 };
 

@@ -6,10 +6,10 @@
 #pragma once
 
 #include "base/error.h"
-#include "compile/compile.h"
 #include "film/film_record.h"
 #include "image/development.h"
 #include "kernel/dialect/bits_version.h"
+#include "scene/aov.h"
 
 #include <array>
 #include <cstdint>

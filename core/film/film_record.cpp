@@ -1,6 +1,7 @@
 // Over 450 lines: what is written of each part stands beside what is read of it.
 #include "film/film_record.h"
 
+#include "base/byte_hash.h"
 #include "base/error.h"
 #include "base/json_integer.h"
 #include "base/vec3d.h"
@@ -12,17 +13,12 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#define XXH_INLINE_ALL
-#include <xxhash.h>
-
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
 #include <ctime>
 #include <limits>
-#include <memory>
-#include <new>
 #include <set>
 #include <type_traits>
 
@@ -67,32 +63,25 @@ void addCamera(FilmRecord& record, const Camera& camera) {
 
 class Digest {
 public:
-    Digest() : state_(XXH3_createState()) {
-        if (!state_) throw std::bad_alloc();
-        XXH3_64bits_reset(state_.get());
-    }
     template <class Number>
     void add(Number number) {
         static_assert(std::is_arithmetic_v<Number> || std::is_enum_v<Number>);
-        XXH3_64bits_update(state_.get(), &number, sizeof number);
+        hash_.add(&number, sizeof number);
     }
     /// The size goes first, so that no item moves from one array to the next unseen.
     template <class Item>
     void add(const std::vector<Item>& items) {
         static_assert(std::is_trivially_copyable_v<Item>);
         add(std::uint64_t{items.size()});
-        if (!items.empty()) XXH3_64bits_update(state_.get(), items.data(), items.size() * sizeof(Item));
+        if (!items.empty()) hash_.add(items.data(), items.size() * sizeof(Item));
     }
     void add(const Spectrum& spectrum) {
         for (const double value : spectrum.values) add(value);
     }
-    std::string digits() const { return fmt::format("{:016x}", XXH3_64bits_digest(state_.get())); }
+    std::string digits() const { return fmt::format("{:016x}", hash_.digest64()); }
 
 private:
-    struct Free {
-        void operator()(XXH3_state_t* state) const { XXH3_freeState(state); }
-    };
-    std::unique_ptr<XXH3_state_t, Free> state_;
+    ByteHash hash_;
 };
 
 std::string vectorText(const Vec3d& v) { return fmt::format("({}, {}, {})", v[0], v[1], v[2]); }

@@ -8,8 +8,6 @@
 
 namespace crt {
 
-struct Scene;
-
 struct Development {
     ColorSpace color_space = ColorSpace::LinearSrgb;
     /// XYZ with Y = 1 of the light that becomes the white of the colour space. Nothing: colours stay as they
@@ -20,13 +18,12 @@ struct Development {
 
     /// For EXR and PFM, and for whatever is measured: radiance in the colour space, without exposure and
     /// white balance unless apply_to_float asks for them (docs/decisions/0013).
-    Development forFloats() const;
+    Development forFloats() const {
+        if (apply_to_float) return *this;
+        return {color_space, std::nullopt, 0, false};
+    }
 
     bool operator==(const Development&) const = default;
 };
-
-/// As scene.film says. Throws crt::Error(Scene) when the illuminant of the white balance has no visible
-/// light.
-Development developmentOf(const Scene& scene);
 
 }  // namespace crt

@@ -11,8 +11,8 @@
 
 #include "base/atomic_file.h"
 #include "image/image.h"
+#include "image/output_format.h"
 #include "image/srgb_encoding.h"
-#include "scene/scene.h"
 
 #include <optional>
 #include <string>

@@ -3,7 +3,7 @@
 
 #include "base/error.h"
 #include "image/image_module.h"
-#include "scene/scene.h"
+#include "image/output_format.h"
 
 #include <string>
 

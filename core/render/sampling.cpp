@@ -1,6 +1,7 @@
 #include "render/sampling.h"
 
 #include "base/log.h"
+#include "base/stopwatch.h"
 
 #include <algorithm>
 #include <bit>
@@ -14,10 +15,6 @@ namespace crt {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-double secondsSince(Clock::time_point start) {
-    return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 constexpr double kChunkSeconds =
     0.4;  // Aimed at, so that the promised half second holds when a chunk is dearer than the last.
@@ -117,10 +114,10 @@ public:
 
     /// film = what was there before + what the device has by now.
     void read() {
-        const Clock::time_point start = Clock::now();
+        const Stopwatch reading;
         copy();
         estimate();
-        read_seconds_ = secondsSince(start);
+        read_seconds_ = reading.seconds();
     }
 
     /// The same without looking at the error: the device waits for no more than the copy.
@@ -142,7 +139,7 @@ public:
             if (before_) next_->add(*before_);
             std::swap(film_, *next_);
         }
-        read_at_ = Clock::now();
+        since_read_ = Stopwatch();
     }
 
     void deviceAdvanced(SampleRange samples) {
@@ -158,14 +155,14 @@ public:
         if (film_.samples.count() > 0) before_ = film_;
     }
     /// Is it time to read again, within the share of time that reading may take?
-    bool due() const { return !current_ && secondsSince(read_at_) >= read_seconds_ / kReadShare; }
+    bool due() const { return !current_ && since_read_.seconds() >= read_seconds_ / kReadShare; }
     bool current() const { return current_; }
     const std::optional<ErrorEstimate>& error() const { return error_; }
 
 private:
     void estimate() {
         error_ = estimateError(film_, PixelSet::All, paths_);
-        read_at_ = Clock::now();
+        since_read_ = Stopwatch();
     }
 
     DeviceFilm& devices_;
@@ -175,7 +172,7 @@ private:
     double read_seconds_;
     std::optional<ErrorEstimate> error_;
     std::vector<SampleRange> unread_;
-    Clock::time_point read_at_ = Clock::now();
+    Stopwatch since_read_;
     bool current_ = true;  // The device's film begins empty.
 };
 
@@ -211,8 +208,8 @@ std::vector<SampleRange> missingSamples(SampleRange wanted, const SampleRanges& 
 
 SamplingResult sampleFilm(DeviceFilm& devices, Film& film, const SamplingPlan& plan, Watch& watch,
                           const std::function<void()>& checkpoint) {
-    const Clock::time_point start = Clock::now();
-    Clock::time_point checkpoint_at = start;
+    const Stopwatch sampling;
+    Stopwatch since_checkpoint;
     SamplingResult result;
     ChunkSizer sizer(plan.chunk);
     FilmReader reader(devices, film, plan.paths);
@@ -240,7 +237,7 @@ SamplingResult sampleFilm(DeviceFilm& devices, Film& film, const SamplingPlan& p
             result.request = *request;
             return StopReason::Interrupted;
         }
-        if (plan.time_limit_seconds > 0 && secondsSince(start) >= plan.time_limit_seconds)
+        if (plan.time_limit_seconds > 0 && sampling.seconds() >= plan.time_limit_seconds)
             return StopReason::Time;
         return std::nullopt;
     };
@@ -252,13 +249,13 @@ SamplingResult sampleFilm(DeviceFilm& devices, Film& film, const SamplingPlan& p
     Patience patience([&] { return reasonToHurry().has_value(); });
 
     const auto renderChunk = [&](std::uint64_t first, std::uint64_t count) {
-        const Clock::time_point chunk_start = Clock::now();
+        const Stopwatch chunk;
         // Called from the plugin's threads: works on its own copy of the state.
-        const auto show = [&watch, &patience, start, count, before = state](double done) {
+        const auto show = [&watch, &patience, &sampling, count, before = state](double done) {
             patience.look(done);
             ProgressState now = before;
             now.samples += std::clamp(done, 0.0, 1.0) * static_cast<double>(count);
-            now.elapsed_seconds = secondsSince(start);
+            now.elapsed_seconds = sampling.seconds();
             watch.progress(now);
         };
         patience.chunkBegins();
@@ -270,18 +267,18 @@ SamplingResult sampleFilm(DeviceFilm& devices, Film& film, const SamplingPlan& p
         // In bands nothing of it is on the devices any more, and a failure later shall not cost it.
         const bool due = reader.due();
         if (devices.inBands()) reader.copy();
-        sizer.finished(count, secondsSince(chunk_start), devices.inBands() ? devices.fixedSeconds() : 0);
+        sizer.finished(count, chunk.seconds(), devices.inBands() ? devices.fixedSeconds() : 0);
         result.rendered += count;
         ++result.chunks;
         if (due) reader.read();
         if (plan.checkpoint_interval_seconds > 0 &&
-            secondsSince(checkpoint_at) >= plan.checkpoint_interval_seconds &&
+            since_checkpoint.seconds() >= plan.checkpoint_interval_seconds &&
             (!plan.checkpoint_possible || plan.checkpoint_possible())) {
-            const Clock::time_point pause = Clock::now();
+            const Stopwatch pause;
             if (!reader.current()) reader.copy();
             checkpoint();
-            checkpoint_at = Clock::now();
-            logDebug("checkpoint: the device waited for {:.3f} s", secondsSince(pause));
+            since_checkpoint = Stopwatch();
+            logDebug("checkpoint: the device waited for {:.3f} s", pause.seconds());
         }
         state.samples = state.start_samples + static_cast<double>(result.rendered);
         state.error = reader.error();
@@ -292,7 +289,7 @@ SamplingResult sampleFilm(DeviceFilm& devices, Film& film, const SamplingPlan& p
             for (std::uint64_t next = first; next < end;) {
                 if (const auto reason = reasonToStop()) return *reason;
                 const double left = plan.time_limit_seconds > 0
-                                        ? plan.time_limit_seconds - secondsSince(start)
+                                        ? plan.time_limit_seconds - sampling.seconds()
                                         : kChunkSeconds;
                 std::uint64_t count = std::min(sizer.next(left), end - next);
                 if (plan.target_error > 0) count = std::min(count, check_at - (resumed + result.rendered));
@@ -341,7 +338,7 @@ SamplingResult sampleFilm(DeviceFilm& devices, Film& film, const SamplingPlan& p
             fail(Error(ErrorKind::Usage,
                        fmt::format("not all pixels have a sample after {:.0f} s, and the time is up; give "
                                    "more --time, or lower integrator.max_depth or film.resolution",
-                                   secondsSince(start))));
+                                   sampling.seconds())));
         else
             logWarning("the samples that were being taken are left out: they took too long after the render "
                        "was to stop");
@@ -353,7 +350,7 @@ SamplingResult sampleFilm(DeviceFilm& devices, Film& film, const SamplingPlan& p
         fail(Error(ErrorKind::Device,
                    fmt::format("the host refuses what rendering needs: {}", error.what())));
     }
-    result.seconds = secondsSince(start);
+    result.seconds = sampling.seconds();
     return result;
 }
 

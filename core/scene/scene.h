@@ -4,6 +4,8 @@
 #pragma once
 
 #include "base/error.h"
+#include "image/development.h"
+#include "image/output_format.h"
 #include "kernel/dialect/features.h"
 #include "scene/aov.h"
 #include "scene/ies_file.h"
@@ -306,8 +308,6 @@ struct Environment {
     bool dependsOnDirection() const { return image || sky; }
 };
 
-enum class OutputFormat { Exr, Png, Ppm, Pfm };
-
 struct Output {
     std::string file;  ///< As resolved: absolute or relative to the working directory.
     OutputFormat format = OutputFormat::Exr;
@@ -346,6 +346,10 @@ inline SpectralChannels spectralChannelsOf(const Scene& scene) {
         channels.responses.push_back(response.name);
     return channels;
 }
+
+/// As scene.film says. Throws crt::Error(Scene) when the illuminant of the white balance has no visible
+/// light.
+Development developmentOf(const Scene& scene);
 
 /// Emission of a triangle of the object's mesh, an index into Scene::emissions: of the file's material, of
 /// the scene's, or of the object; −1: it emits nothing.

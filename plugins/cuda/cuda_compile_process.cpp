@@ -1,6 +1,6 @@
 #include "cuda_compile_process.h"
 
-#include "cuda_program.h"
+#include "cuda_lean_kernel.h"
 
 #include <dlfcn.h>
 #include <fcntl.h>
@@ -17,6 +17,7 @@
 #include <cstring>
 #include <mutex>
 #include <stdexcept>
+#include <utility>
 #include <vector>
 
 namespace crt::cuda {

@@ -3,6 +3,7 @@
 
 #include "backend/loader.h"
 #include "base/error.h"
+#include "base/stopwatch.h"
 #include "base/unit_text.h"
 #include "compile/compile.h"
 #include "film/film.h"
@@ -13,7 +14,6 @@
 
 #include <algorithm>
 #include <bit>
-#include <chrono>
 #include <cmath>
 
 namespace crt {
@@ -43,16 +43,14 @@ public:
         finished_ += samples;
         show(0, 0);
     }
-    double seconds() const {
-        return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
-    }
+    double seconds() const { return stopwatch_.seconds(); }
 
 private:
     Watch& watch_;
     WatchedRendering rendering_;
     ProgressState state_;
     std::uint64_t finished_ = 0;
-    std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+    Stopwatch stopwatch_;
 };
 
 /// A backend with its device, and what it renders of one scene with any seed.
@@ -173,8 +171,8 @@ BackendComparison compareBackends(const Scene& scene, const BackendComparisonOpt
     const CompiledScene compiled = compileScene(scene, 0);
     result.reference = options.backends.back();
     result.scene_file = scene.file;
-    result.width = compiled.width;
-    result.height = compiled.height;
+    result.width = compiled.header().width;
+    result.height = compiled.header().height;
     result.seed = scene.sampler.seed;
     result.replicates = options.replicates;
     result.gate = options.gate;

@@ -2,6 +2,7 @@
 #include "film/resolve.h"
 
 #include "backend/loader.h"
+#include "base/stopwatch.h"
 #include "compile/compile.h"
 #include "film/error_estimate.h"
 #include "film/luminance_error.h"
@@ -10,12 +11,12 @@
 #include "judge/stats/color_difference.h"
 #include "judge/stats/flip.h"
 #include "judge/stats/metrics.h"
+#include "render/brightest_path.h"
 #include "render/report.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
@@ -24,11 +25,6 @@
 
 namespace crt::converge {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-double secondsSince(Clock::time_point start) {
-    return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 /// The reference's luminances, one for each pixel.
 std::vector<float> spread(const Reference& reference, std::size_t pixels) {
@@ -89,16 +85,16 @@ void Contestant::describe(const CompiledScene& compiled) {
     if (report.kernel_from_cache != 0) c.kernel += ", from the cache";
     c.scene_file = scene_.file;
     c.scene_hash = compiled.hash;
-    c.width = compiled.width;
-    c.height = compiled.height;
-    for (const std::string& feature : featureList(compiled.features))
+    c.width = compiled.header().width;
+    c.height = compiled.header().height;
+    for (const std::string& feature : featureList(compiled.header().features))
         c.kept.push_back({feature, "the scene needs it"});
     for (const auto& [what, why] : compiled.left_out) c.left_out.push_back({what, why});
     c.stages.parse = scene_.parse_seconds;
     c.stages.build = compiled.compile_seconds + compiled.build_seconds + report.build_seconds;
     c.stages.compile = report.compile_seconds + report.cache_seconds;
     c.stages.upload = report.upload_seconds;
-    tests_ = stats::Replicates(compiled.width, compiled.height, 3);
+    tests_ = stats::Replicates(compiled.header().width, compiled.header().height, 3);
 }
 
 /// What a film amounts to after so many samples.
@@ -162,9 +158,11 @@ void Contestant::keepPicture(const Film& film, const Image& image, double mean_l
 /// The same seed and samples are the same bits as that replicate's look was.
 void Contestant::renderPicture(std::uint32_t replicate, std::uint64_t samples) {
     scene_.sampler.seed = seed_ + 1 + replicate;
-    session_->setScene(session_->compile(scene_));
-    session_->render({.first_sample = 0, .sample_count = samples});
-    const Film film = session_->film();
+    const CompiledScene compiled = session_->compile(scene_);
+    session_->group().setScene(compiled);
+    session_->group().render({.first_sample = 0, .sample_count = samples});
+    Film film(filmShapeOf(compiled));
+    session_->group().readFilm(film);
     const Image image = resolveImage(film, developmentOf(scene_).forFloats(), 0);
     keepPicture(film, image, stats::meanLuminance(looks_.at(samples).at(replicate)));
 }
@@ -172,18 +170,18 @@ void Contestant::renderPicture(std::uint32_t replicate, std::uint64_t samples) {
 /// What only the very first sample pays, such as an OpenCL driver that makes machine code late, belongs to
 /// the start and not to a replicate.
 void Contestant::warmUp(const CompiledScene& compiled) {
-    const Clock::time_point start = Clock::now();
-    session_->render({.first_sample = 0, .sample_count = 1});
-    configuration_.stages.first_sample = secondsSince(start);
+    const Stopwatch start;
+    session_->group().render({.first_sample = 0, .sample_count = 1});
+    configuration_.stages.first_sample = start.seconds();
     start_seconds_ += configuration_.stages.first_sample;
-    session_->setScene(compiled);
+    session_->group().setScene(compiled);
 }
 
 void Contestant::prepare() {
-    const Clock::time_point setup = Clock::now();
+    const Stopwatch setup;
     const CompiledScene compiled = session_->compile(scene_);
-    session_->setScene(compiled);
-    start_seconds_ += secondsSince(setup);
+    session_->group().setScene(compiled);
+    start_seconds_ += setup.seconds();
     if (configuration_.width == 0) describe(compiled);
     warmUp(compiled);
     start_waits_ = true;
@@ -222,25 +220,26 @@ bool Contestant::replicate(std::uint32_t replicate, std::uint64_t most_samples, 
                            const std::function<void(const Row&)>& found, const std::function<bool()>& stop) {
     scene_.sampler.seed = seed_ + 1 + replicate;
     const CompiledScene compiled = session_->compile(scene_);
-    session_->setScene(compiled);
-    const Clock::time_point start = Clock::now();
+    session_->group().setScene(compiled);
+    const Stopwatch start;
 
     const CrtBackendReport before = session_->report();
     const bool exploring = replicate == 0;
     double wall = 0;
     for (std::uint64_t done = 0, next = 1; done < most_samples; next *= 2) {
         if (stop()) return false;
-        const Clock::time_point step = Clock::now();
-        session_->render({.first_sample = done, .sample_count = next - done});
-        const double step_seconds = secondsSince(step);
+        const Stopwatch step;
+        session_->group().render({.first_sample = done, .sample_count = next - done});
+        const double step_seconds = step.seconds();
         wall += step_seconds;
         done = next;
         if (exploring) samples_reached_ = done;
 
-        const Film film = session_->film();
+        Film film(filmShapeOf(compiled));
+        session_->group().readFilm(film);
         // The next doubling takes as long as all before it, and its look some more.
         const bool last =
-            done * 2 > most_samples || (exploring && secondsSince(start) + 2.2 * step_seconds > seconds);
+            done * 2 > most_samples || (exploring && start.seconds() + 2.2 * step_seconds > seconds);
         Row row = look(film, replicate, last);
         const CrtBackendReport now = session_->report();
         row.render_wall_seconds = wall;
@@ -255,7 +254,7 @@ bool Contestant::replicate(std::uint32_t replicate, std::uint64_t most_samples, 
         if (last) break;
     }
     configuration_.stages.render_wall = wall;
-    seconds_of_last_ = secondsSince(start) + (start_waits_ ? start_seconds_ : 0);
+    seconds_of_last_ = start.seconds() + (start_waits_ ? start_seconds_ : 0);
     start_waits_ = false;
     return true;
 }

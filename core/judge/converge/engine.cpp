@@ -7,6 +7,7 @@
 #include "base/error.h"
 #include "base/host.h"
 #include "base/log.h"
+#include "base/stopwatch.h"
 #include "base/unit_text.h"
 #include "judge/converge/contestant.h"
 #include "judge/converge/experiment.h"
@@ -21,7 +22,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -34,7 +34,6 @@ namespace crt::converge {
 namespace {
 
 namespace fs = std::filesystem;
-using Clock = std::chrono::steady_clock;
 
 /// Part of --time that goes into references where none was given.
 constexpr double kReferenceShare = 0.25;
@@ -48,7 +47,7 @@ constexpr double kStartShare = 0.5;
 class Engine {
 public:
     Engine(const ConvergeRequest& request, Watch& watch)
-        : request_(request), watch_(watch), start_(Clock::now()) {}
+        : request_(request), watch_(watch) {}
 
     int run() {
         refuseAmbiguity();
@@ -64,7 +63,7 @@ public:
     }
 
 private:
-    double elapsed() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
+    double elapsed() const { return stopwatch_.seconds(); }
     std::string path(const std::string& name) const { return (fs::path(request_.output) / name).string(); }
     bool stopped() const { return watch_.stopRequested().has_value(); }
 
@@ -474,7 +473,7 @@ private:
     };
     const ConvergeRequest& request_;
     Watch& watch_;
-    Clock::time_point start_;
+    const Stopwatch stopwatch_;
     Run run_;
     std::vector<std::string> names_;  ///< Of the scenes, in keys.
     bool holds_rows_ = false;         ///< The folder did, when the run began.

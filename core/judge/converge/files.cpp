@@ -1,5 +1,6 @@
 #include "judge/converge/files.h"
 
+#include "base/byte_hash.h"
 #include "base/error.h"
 #include "base/input_file.h"
 #include "base/json_integer.h"
@@ -8,9 +9,6 @@
 #include <fmt/format.h>
 
 // In the header's inline form, so that nothing has to be linked or found at run time.
-#define XXH_INLINE_ALL
-#include <xxhash.h>
-
 #include <fcntl.h>
 #include <unistd.h>
 #include <cerrno>
@@ -21,7 +19,6 @@
 #include <functional>
 #include <limits>
 #include <map>
-#include <memory>
 #include <tuple>
 
 namespace crt::converge {
@@ -311,17 +308,13 @@ void writeCsv(const std::string& path, const std::vector<Row>& rows) {
 
 std::string hashOfFile(const std::string& path) {
     std::ifstream file(path, std::ios::binary);
-    const std::unique_ptr<XXH3_state_t, void (*)(XXH3_state_t*)> state(
-        XXH3_createState(), [](XXH3_state_t* s) { XXH3_freeState(s); });
-    if (!state) throw std::bad_alloc();
-    XXH3_128bits_reset(state.get());
+    ByteHash hash;
     std::vector<char> buffer(1 << 16);
     while (file.read(buffer.data(), static_cast<std::streamsize>(buffer.size())) || file.gcount() > 0)
-        XXH3_128bits_update(state.get(), buffer.data(), static_cast<std::size_t>(file.gcount()));
+        hash.add(buffer.data(), static_cast<std::size_t>(file.gcount()));
     if (file.bad() || !file.eof())
         throw Error(ErrorKind::Usage, fmt::format("cannot read '{}'", path), {path});
-    const XXH128_hash_t hash = XXH3_128bits_digest(state.get());
-    return fmt::format("{:016x}{:016x}", hash.high64, hash.low64);
+    return hash.digits128();
 }
 
 void writeManifest(const std::string& path, const Run& run, const std::vector<std::string>& files) {

@@ -5,11 +5,13 @@
 #include "base/atomic_file.h"
 #include "base/log.h"
 #include "base/statistics.h"
+#include "base/stopwatch.h"
 #include "base/unit_text.h"
 #include "compile/compile.h"
 #include "film/luminance_error.h"
 #include "image/image_io.h"
 #include "judge/converge/files.h"
+#include "render/brightest_path.h"
 #include "render/output_guard.h"
 #include "render/sampling.h"
 #include "render/session.h"
@@ -180,37 +182,35 @@ std::optional<RenderedFolds> renderFolds(const Scene& scene, Session& session,
     const CompiledScene compiled = session.compile(scene);
     const FilmShape shape = filmShapeOf(compiled);
     session.openDevice();  // Not in the time that the samples have.
-    const WatchedRendering rendering(watch);
+    const WatchedRendering watched(watch);
     ProgressState state;
     state.pixels = std::uint64_t{shape.width} * shape.height;
-    const auto started = std::chrono::steady_clock::now();
-    const auto elapsed = [started] {
-        return std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
-    };
+    const Stopwatch rendering;
     RenderedFolds folds{Film(shape), {}, {true, brightestPathOf(compiled)}};
     std::uint64_t per_fold = request.samples / kFolds;
     for (std::uint32_t fold = 0; fold < kFolds; ++fold) {
-        session.setScene(compiled);
+        session.group().setScene(compiled);
         const std::uint64_t first = std::uint64_t{fold} << 44;
         std::uint64_t done = 0;
         for (std::uint64_t chunk = 1; per_fold == 0 || done < per_fold;) {
             if (watch.stopRequested()) return std::nullopt;
-            const double before = elapsed();
+            const double before = rendering.seconds();
             if (per_fold > 0) chunk = std::min(chunk, per_fold - done);
-            session.render({.first_sample = first + done, .sample_count = chunk});
+            session.group().render({.first_sample = first + done, .sample_count = chunk});
             done += chunk;
-            const double took = std::max(elapsed() - before, 1e-6);
-            state.elapsed_seconds = elapsed();
+            const double took = std::max(rendering.seconds() - before, 1e-6);
+            state.elapsed_seconds = rendering.seconds();
             state.samples = static_cast<double>(fold * per_fold + done);
             state.target = per_fold * kFolds;
             if (request.samples == 0) state.time_limit_seconds = request.seconds;
             watch.progress(state);
-            if (per_fold == 0 && elapsed() > 0.04 * request.seconds)
+            if (per_fold == 0 && rendering.seconds() > 0.04 * request.seconds)
                 per_fold =
                     std::max(done, affordable(request.seconds / kFolds, took / static_cast<double>(chunk)));
             if (took < 0.25) chunk *= 2;
         }
-        const Film part = session.film();
+        Film part(shape);
+        session.group().readFilm(part);
         if (part.invalidSamples() > 0)
             throw Error(
                 ErrorKind::Device,
@@ -254,7 +254,7 @@ std::optional<MadeReference> renderReference(Scene scene, const ReferenceRequest
         throw Error(ErrorKind::Usage, fmt::format("--spp must be at least {} for a reference", kFolds));
     refuseOverInputs(scene.files_read, {request.output});
     checkWritable(request.output);
-    const auto started = std::chrono::steady_clock::now();
+    const Stopwatch rendering;
     const std::string content = hashOfContent(scene), colour = colourText(scene),
                       record = recordText(recordOf(scene));
     const bool sampled = scene.integrator.nee;
@@ -273,7 +273,7 @@ std::optional<MadeReference> renderReference(Scene scene, const ReferenceRequest
     file.metadata.emplace_back("crt/backend", session.backend().name);
     file.metadata.emplace_back("crt/seed", std::to_string(scene.sampler.seed));
     writeImage(request.output, OutputFormat::Exr, file);
-    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
+    const double seconds = rendering.seconds();
     return MadeReference{folds->film.samples.count(), estimatorText(scene), seconds,
                          estimateError(folds->film, PixelSet::All, folds->paths)};
 }

@@ -3,6 +3,7 @@
 
 #include "base/input_file.h"
 #include "base/log.h"
+#include "base/stopwatch.h"
 #include "scene/import/import.h"
 #include "scene/length_unit.h"
 #include "scene/scene_limits.h"
@@ -23,7 +24,6 @@
 
 #include <algorithm>
 #include <bit>
-#include <chrono>
 #include <cmath>
 #include <deque>
 #include <filesystem>
@@ -229,10 +229,13 @@ void readScene(const YamlNode& root, Diagnostics& out, SceneFiles& files, GltfFi
     if (const auto section = top.section("sampler", "sampler")) readSampler(*section, scene.sampler);
 
     TextureReader textures(out, files, spectra, gltf, scene);
-    ObjectReader objects(out, files, spectra, textures, gltf, scene);
-    if (model_mesh) objects.offer(std::move(model_mesh));
-    if (const YamlNode* map = top.map("materials")) objects.readMaterials(*map);
-    if (const YamlNode* list = top.list("objects")) objects.readObjects(*list);
+    MaterialReader materials(out, spectra, textures, scene);
+    SceneRoom room{.limit = ExpansionLimit(scene.input_bytes)};
+    MeshReader meshes(out, files, textures, gltf, materials, room, scene);
+    if (model_mesh) meshes.offer(std::move(model_mesh));
+    if (const YamlNode* map = top.map("materials")) materials.read(*map);
+    if (const YamlNode* list = top.list("objects"))
+        ObjectReader(out, materials, meshes, room, scene).read(*list);
     if (const YamlNode* list = top.list("lights")) readLights(*list, out, files, spectra, scene);
     if (const auto section = top.section("environment", "environment"))
         scene.environment = readEnvironment(*section, spectra, files);
@@ -244,14 +247,14 @@ void readScene(const YamlNode& root, Diagnostics& out, SceneFiles& files, GltfFi
 
     spectra.finish();
     scene.whites = spectra.whites();
-    if (!out.failed()) objects.finish();
+    if (!out.failed()) materials.finish();
 }
 
 /// `path` is the file of the scene; empty for text of another origin. `composed` may be null.
 Scene parse(const std::string& yaml, const std::string& name, const std::string& path,
             const std::vector<SceneOverride>& overrides, std::string* composed, SceneFiles files,
             GltfFiles gltf = {}, std::unique_ptr<LoadedMesh> model_mesh = {}) {
-    const auto start = std::chrono::steady_clock::now();
+    const Stopwatch reading;
     Scene scene;
     scene.file = name;
     scene.input_bytes = yaml.size();
@@ -271,7 +274,7 @@ Scene parse(const std::string& yaml, const std::string& name, const std::string&
         if (file != name || isModel(name)) scene.input_bytes += std::filesystem::file_size(file, unknown);
     // A scene of a program, which may still put meshes into it.
     if (scene.files_read.empty()) scene.input_bytes = 0;
-    scene.parse_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    scene.parse_seconds = reading.seconds();
     return scene;
 }
 
@@ -316,15 +319,14 @@ SceneOverride parseOverride(const std::string& text) {
 Scene loadScene(const std::string& path, const std::vector<SceneOverride>& overrides,
                 std::string* composed) {
     if (isModel(path)) {
-        const auto start = std::chrono::steady_clock::now();
+        const Stopwatch reading;
         GltfFiles gltf;
         ImportedModel model = importModel(gltf, path);
         SceneFiles files(std::filesystem::path(path).parent_path().string());
         files.note(path);
         Scene scene = parse(model.scene, path, {}, overrides, composed, std::move(files), std::move(gltf),
                             std::move(model.mesh));
-        const std::chrono::duration<double> passed = std::chrono::steady_clock::now() - start;
-        scene.parse_seconds = passed.count();
+        scene.parse_seconds = reading.seconds();
         return scene;
     }
     const std::string other = otherRendererOf(path);

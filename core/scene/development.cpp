@@ -1,14 +1,6 @@
-#include "image/development.h"
-
-#include "base/error.h"
 #include "scene/scene.h"
 
 namespace crt {
-
-Development Development::forFloats() const {
-    if (apply_to_float) return *this;
-    return {.color_space = color_space, .white = std::nullopt, .exposure_ev = 0, .apply_to_float = false};
-}
 
 Development developmentOf(const Scene& scene) {
     Development development{.color_space = scene.film.color_space,
