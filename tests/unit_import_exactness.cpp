@@ -95,7 +95,7 @@ TEST_CASE("Specular and glossiness become a metal or a dielectric", "[gltf][impo
                Contains("base_color: {texture: a.glb, image: 0}\n    base_metalness: 1\n    "
                         "specular_roughness: " +
                         yamlNumber(1 - (255 + 128 + 64) / 4.0 / 255)) &&
-                   Contains("glossiness by a texture: its mean"));
+                   Contains("glossiness by a texture: crt uses its mean"));
     const Json painted{{"diffuseTexture", {{"index", 0}}}, {"specularFactor", {0, 0, 0}}};
     CHECK_THAT(textOf(painted, true),
                Contains("base_color: {texture: a.glb, image: 0}\n") && Contains("specular_ior: 1\n"));
@@ -121,7 +121,7 @@ TEST_CASE("Specular and glossiness become a metal or a dielectric", "[gltf][impo
     CHECK_THAT(textOf(shiny, true),
                Contains("base_color: {texture: a.glb, image: 0, factor: [0.4, 0.4, 0.4]}"
                         "\n    specular_roughness: 0\n") &&
-                   Contains("a metal with a texture of diffuse colour: a dielectric"));
+                   Contains("a metal with a texture of diffuse colour: crt makes it a dielectric"));
     CHECK_THAT(textOf({{"diffuseFactor", "red"}, {"specularFactor", {1}}, {"glossinessFactor", {}}}),
                Contains("base_metalness: 1\n"));
 }

@@ -279,7 +279,7 @@ TEST_CASE("a scene without a BVH is for backends that bring one", "[integrator]"
     Integrator fake(openFake("fake"), {});
     CHECK(fake.compileOptions().accelerator_reach == 0);
     CHECK(kindOfFailure([&] { fake.setScene(without); },
-                        "backend 'fake' needs the BVH that was left out of this scene") ==
+                        "backend 'fake' needs the BVH, and this scene was compiled without it") ==
           ErrorKind::Internal);
     fake.setScene(makeScene(4, 3));
     Integrator brings(openFake("many_devices"), {});

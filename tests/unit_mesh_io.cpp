@@ -163,7 +163,7 @@ TEST_CASE("another format is named as what it is", "[mesh_io]") {
     std::string stl(84 + 50, '\0');
     stl[80] = 1;
     for (const auto& [content, words] : std::vector<std::pair<std::string, std::string>>{
-             {"ply\nformat ascii 1.0\n", "this is a PLY file; name it by 'ply:' in place of 'obj:'"},
+             {"ply\nformat ascii 1.0\n", "this is a PLY file; use 'ply:' instead of 'obj:'"},
              {"glTF\x02\0\0\0"s, "this is a binary glTF file (.glb); crt reads OBJ"},
              {"{\n  \"asset\": {\"version\": \"2.0\"}}", "this is a glTF file"},
              {"\x89PNG\r\n\x1a\n", "this is a PNG image"},

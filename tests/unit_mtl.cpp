@@ -211,7 +211,7 @@ TEST_CASE("materials of families of exporters are what they were", "[mesh_io][mt
     // Maya, with a texture
     const Material textured = loadMaterial("illum 4\nKd 0 0 0\nmap_Kd a.jpg\nTf 1 1 1\n").material;
     CHECK(textured.reflectance[200] == Approx(0.6).epsilon(1e-3));
-    CHECK_THAT(log.text(), Contains("a black Kd beside map_Kd read as grey 0.6 (1)"));
+    CHECK_THAT(log.text(), Contains("a black Kd together with map_Kd read as grey 0.6 (1)"));
     // A Sponza in circulation
     CHECK(typeOf("Ns 7.843137\nKa 0 0 0\nKd 0.4704 0.4704 0.4704\nKs 0 0 0\nNi 1.000000\nd 0.000000\nillum "
                  "2\nmap_Kd KAMEN.JPG\n") == MaterialType::Diffuse);

@@ -333,7 +333,7 @@ TEST_CASE("bad PLYs are refused with their place", "[ply]") {
     checkRefused(with(kHeader, "float y", "real y"), 5, "'real' is no type of PLY");
     checkRefused(with(kHeader, "float y", "float"), 5, "a property has a type and a name");
     checkRefused(with(kHeader, "list uchar", "list float"), 8, "the length of a list is an integer");
-    checkRefused(with(kHeader, "element vertex 3\n", ""), 3, "a property stands before the first element");
+    checkRefused(with(kHeader, "element vertex 3\n", ""), 3, "a property precedes the first element");
     checkRefused(with(kHeader, "property float y", "colour float y"), 5,
                  "'colour' is no statement of a PLY header");
     checkRefused(with(kHeader, "float y", "float w"), 3, "vertices need the numbers x, y and z");
@@ -354,7 +354,7 @@ TEST_CASE("bad PLYs are refused with their place", "[ply]") {
     checkRefused(kHeader + kVertices, 7,
                  "the header says 1 of 'face', 2 bytes each or more, and 0 bytes follow");
     checkRefused(with(kHeader, "face 1", "face 3") + kVertices + face, 13,
-                 "face 1 of 3, counted from 0, is not there: the file ends before it");
+                 "face 1 of 3, counted from 0, is missing: the file ends before it");
     // Rows
     checkRefused(kHeader + "0 0 0\n1 0\n0 1 0\n" + face, 11,
                  "vertex 1 of 3, counted from 0, has too few values on its line");
@@ -381,7 +381,7 @@ TEST_CASE("bad PLYs are refused with their place", "[ply]") {
     checkRefused(with(kHeader, "face 1", "face 0") + kVertices, 0, "this mesh has no faces, only 3 points");
     // Other files
     checkRefused("v 0 0 0\n", 0,
-                 "this is no PLY file, which begins with the line 'ply'; an OBJ is named by 'obj:'");
+                 "this is not a PLY file, because its first line is not 'ply'; an OBJ is named by 'obj:'");
     checkRefused("\x89PNG\r\n", 0, "this is a PNG image; 'ply:' names a PLY");
     checkRefused("", 0, "this is no PLY file");
 }
@@ -486,13 +486,13 @@ TEST_CASE("a PLY in a scene", "[ply][scene_yaml]") {
     CHECK_THAT(refused(grey + "objects: [{ply: plain.ply}]", {}, folder.path()),
                Contains("'material' is missing in object 0"));
     CHECK_THAT(refused(grey + "objects: [{ply: plain.ply, material: from_mtl}]", {}, folder.path()),
-               Contains("only an OBJ has materials of its own"));
+               Contains("only an OBJ has its own materials"));
     for (const char* key : {"override: true", "mtl: {color: srgb}", "parts: {a: {material: grey}}"})
         CHECK_THAT(refused(fmt::format("{}objects: [{{ply: plain.ply, material: grey, {}}}]", grey, key), {},
                            folder.path()),
                    Contains("only an OBJ has"));
     CHECK_THAT(refused(grey + "objects: [{obj: plain.ply, material: grey}]", {}, folder.path()),
-               Contains("this is a PLY file; name it by 'ply:' in place of 'obj:'"));
+               Contains("this is a PLY file; use 'ply:' instead of 'obj:'"));
     CHECK_THAT(refused(grey + "objects: [{ply: plian.ply, material: grey}]", {}, folder.path()),
                Contains("cannot find 'plian.ply'") && Contains("did you mean 'plain.ply'?"));
     CHECK_THAT(refused("materials: {c: {type: diffuse, reflectance: {attribute: colors}}}\nobjects: [{ply: "
@@ -502,5 +502,5 @@ TEST_CASE("a PLY in a scene", "[ply][scene_yaml]") {
     folder.write("plain.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
     CHECK_THAT(refused(grey + "objects: [{obj: plain.obj, material: grey, vertex_colors: srgb}]", {},
                        folder.path()),
-               Contains("this is about the colours in a PLY"));
+               Contains("this key needs colours from a PLY"));
 }

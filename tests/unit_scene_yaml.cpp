@@ -293,7 +293,7 @@ TEST_CASE("spectrum files are found beside the scene", "[scene_yaml]") {
           constantSpectrum(1));
 
     CHECK_THAT(refused("environment: {radiance: {file: lamp.spd}}", {}, folder.path()),
-               Contains("scene.yaml:2:32: error") && Contains("say 'outside: clamp' or 'outside: zero'"));
+               Contains("scene.yaml:2:32: error") && Contains("add 'outside: clamp' or 'outside: zero'"));
     folder.write("broken.spd", "400 1\n500 x\n");
     CHECK_THAT(refused("environment: {radiance: {file: broken.spd, outside: zero}}", {}, folder.path()),
                Contains("scene.yaml:2:32: error") && Contains("broken.spd:2"));

@@ -610,7 +610,7 @@ TEST_CASE("an OBJ brings texture coordinates, its MTL images", "[texture][obj]")
     CHECK(cut.textures.at(static_cast<std::size_t>(leaf.normal_texture)).image->kind ==
           crt::TexelKind::Normals);
     CHECK((fence.opacity == .5 && fence.opacity_texture == crt::kNoTexture));
-    CHECK_THAT(log.text(), Contains("c.mtl:9") && Contains("the d beside it counts"));
+    CHECK_THAT(log.text(), Contains("c.mtl:9") && Contains("crt uses d instead"));
 
     // A material of the scene's, on an OBJ with texture coordinates and on one without.
     const std::string own =

@@ -437,7 +437,7 @@ def write_pictures(folder, pools):
 def where_time_goes(results, rows, factor, room):
     """Time to an error is time per path times paths needed; the two factors of each pairing that has the
     same roulette."""
-    results.heading("Where the time goes")
+    results.heading("Time by stage")
     table, per_paths = [], []
     for roulette in (False, True):
         ours, theirs = (

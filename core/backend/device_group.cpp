@@ -224,7 +224,8 @@ void DeviceGroup::inParallel(const std::vector<Member*>& members,
     if (working().empty()) throw Error(*last_failure_);
     for (std::size_t i = 0; i < members.size(); ++i)
         if (thrown[i])
-            logWarning("device {} '{}' is dropped, the others go on: {}", members[i]->share.selector,
+            logWarning("device {} '{}' is dropped; the other devices continue: {}",
+                       members[i]->share.selector,
                        members[i]->share.name, members[i]->share.failure);
 }
 

@@ -219,10 +219,11 @@ struct Integrator::Impl {
             for (std::size_t i = 0; i < channels * std::size_t{2}; ++i) finite &= std::isfinite(sums[i]);
             if (finite && part.counts[pixel] <= asked) continue;
             const std::string what =
-                finite ? fmt::format("has {} samples and {} were asked for", part.counts[pixel], asked)
+                finite ? fmt::format("has {} samples instead of {}", part.counts[pixel], asked)
                        : "is not a number";
             throw Error(ErrorKind::Internal, fmt::format("backend '{}' broke the contract: pixel {},{} of "
-                                                         "its film {}; what was rendered before is kept",
+                                                         "its film {}; the samples rendered before it are "
+                                                         "kept",
                                                          backend.name, pixel % width, pixel / width, what));
         }
     }
@@ -301,7 +302,8 @@ void Integrator::setScene(const CompiledScene& scene, const std::function<void(d
     if (scene.without_nodes && acceleratorReach(self.backend) == 0) {
         throw Error(
             ErrorKind::Internal,
-            fmt::format("backend '{}' needs the BVH that was left out of this scene", self.backend.name));
+            fmt::format("backend '{}' needs the BVH, and this scene was compiled without it",
+                        self.backend.name));
     }
     CrtSceneBlob blob{};
     blob.struct_size = sizeof(blob);
@@ -340,7 +342,7 @@ bool Integrator::render(const RenderRange& range, const std::function<bool(doubl
                                 r[2], r[3], self.width, self.height));
     }
     if (range.sample_count > std::numeric_limits<std::uint64_t>::max() - range.first_sample) {
-        throw Error(ErrorKind::Usage, fmt::format("{} samples from sample {} on exceed 64 bits",
+        throw Error(ErrorKind::Usage, fmt::format("{} samples from sample {} exceed 64 bits",
                                                   range.sample_count, range.first_sample));
     }
     if (range.sample_count == 0) return true;
@@ -380,7 +382,7 @@ void Integrator::readFilm(Film& film) {
     const FilmShape& shape = film.shape();
     if (shape.width != self.width || shape.height != self.height || shape.channels != self.channels ||
         ((shape.aovs & kAovPrimitive) != 0) != self.has_primitives) {
-        throw Error(ErrorKind::Internal, "readFilm was given a film of another shape than the scene's");
+        throw Error(ErrorKind::Internal, "readFilm got a film whose shape differs from the scene's");
     }
 
     if (film.samples.count() > 0) {

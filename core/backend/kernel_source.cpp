@@ -152,7 +152,8 @@ const char* kernelSource(const std::string& name) {
                     throw Error(
                         ErrorKind::Backend,
                         fmt::format(
-                            "CRT_KERNEL_DIR ({}) holds another {} than this crt was built with: rebuild crt",
+                            "CRT_KERNEL_DIR ({}) holds a {} that differs from the one in this crt: rebuild "
+                            "crt",
                             directory, header));
                 }
             }

@@ -154,15 +154,15 @@ void checkTable(const std::string& name, const std::string& path, const CrtBacke
     if (bitsVersionOf(*table) != CRT_BITS_VERSION) {
         refuse(fmt::format(
             "backend '{}' ({}) renders bits version {} ({}), and this crt has bits version {} ({}): its "
-            "samples would be others; rebuild the plugin",
+            "samples would differ; rebuild the plugin",
             name, path, bitsVersionOf(*table), orUnknown(table->build), CRT_BITS_VERSION, kHostBuild));
     }
     // Not a number is no reach either.
     if (hasBrings(*table) && (table->brings & CRT_BRINGS_ACCELERATOR) != 0 &&
         !(table->accelerator_reach >= 1)) {
         refuse(
-            fmt::format("backend '{}' ({}) broke the contract: it brings an acceleration structure that "
-                        "reaches {}, and scenes reach 1",
+            fmt::format("backend '{}' ({}) broke the contract: its acceleration structure reaches {}, and "
+                        "scenes reach 1",
                         name, path, table->accelerator_reach));
     }
     if (table->name == nullptr || table->probe == nullptr || table->create == nullptr) {
@@ -233,7 +233,7 @@ std::string cacheDirectory() {
     struct stat status {};
     if (::stat(directory.c_str(), &status) != 0) return {};
     if (const std::string why = trust::whyNot(status, directory); !why.empty()) {
-        logWarning("no kernel cache, so kernels are compiled anew: {}", why);
+        logWarning("no kernel cache, so every process compiles its kernels: {}", why);
         return {};
     }
     return directory;

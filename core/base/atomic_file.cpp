@@ -125,7 +125,7 @@ AtomicFile::AtomicFile(const std::string& path) : path_(path), final_(path) {
             refuse(path_, fmt::format("it is a link to '{}', whose directory does not exist", final_));
         // Such as /proc, where the kernel makes the files.
         if (error_number == ENOENT && fs::is_directory(directoryOf(final_), ignored))
-            refuse(path_, fmt::format("the folder '{}' takes no files", directoryOf(final_)));
+            refuse(path_, fmt::format("the folder '{}' does not allow new files", directoryOf(final_)));
         if (error_number == ENOENT)
             refuse(path_, fmt::format("the directory '{}' does not exist", directoryOf(final_)));
         fail("cannot write", error_number);
@@ -170,7 +170,7 @@ void AtomicFile::openStreamed() {
     const int error_number = errno;
     const std::string wanted = std::exchange(temporary_, {});
     throw Error(ErrorKind::Output,
-                fmt::format("cannot write '{}', which is to go to standard output: {}", wanted,
+                fmt::format("cannot write '{}', which is meant for standard output: {}", wanted,
                             std::strerror(error_number)));
 }
 

@@ -126,7 +126,7 @@ std::string whyNot(const struct stat& status, const std::string& name) {
     const mode_t mode = status.st_mode;
     if (!trustedOwner(status.st_uid))
         return inQuotationMarks(name) + " belongs to another user (" + nameOfUser(status.st_uid) +
-               "), who could have put anything there";
+               "), who could have replaced it";
     if (S_ISDIR(mode) && (mode & S_ISVTX) != 0) return {};
     const Program& p = program();
     const std::string remedy = " can write to " + inQuotationMarks(name) + " (mode " + modeText(mode) +
@@ -151,7 +151,7 @@ std::string whyNotIn(const std::string& folder, const std::string& entry, const 
     if (isAbove(folder, home) && (entry == home || isAbove(entry, home))) return {};
     struct stat status {};
     if (::stat(folder.c_str(), &status) != 0)
-        return inQuotationMarks(folder) + " cannot be looked at: " + std::strerror(errno);
+        return inQuotationMarks(folder) + " cannot be inspected: " + std::strerror(errno);
     return whyNot(status, folder);
 }
 
@@ -191,7 +191,7 @@ Judged follow(const std::string& name) {
         if (!trustedOwner(status.st_uid))
             return {{},
                     inQuotationMarks(entry) + " is a link of another user (" + nameOfUser(status.st_uid) +
-                        "), who could have made it lead anywhere"};
+                        "), who could point it anywhere"};
         char target[PATH_MAX];
         const ssize_t length = ::readlink(entry.c_str(), target, sizeof target);
         if (length < 0) return {{}, cannotBeOpened(name, errno)};

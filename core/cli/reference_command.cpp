@@ -31,11 +31,11 @@ OptionGroup options(State& state) {
          .read = [&request](const std::string& text) { request.samples = parseCount(text, "--spp", 8); }},
         {.names = "--time",
          .placeholder = "DURATION",
-         .help = "about this long (60s)",
+         .help = "approximate time (60s)",
          .read = [&request](const std::string& text) { request.seconds = parseDuration(text, "--time"); }},
         {.names = "--same-estimator",
          .placeholder = {},
-         .help = "keep integrator.nee: much less noise in scenes with small lamps",
+         .help = "keep integrator.nee as it is: much less noise in scenes with small lights",
          .read = [&request](const std::string&) { request.same_estimator = true; }},
         backendOption(request.backend),
     };

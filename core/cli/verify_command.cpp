@@ -64,7 +64,7 @@ void readPart(const std::string& text, Arguments& to) {
     if (!has_slash || std::from_chars(slash + 1, end, to.parts).ptr != end || to.part < 1 ||
         to.part > to.parts)
         throw Error(ErrorKind::Usage,
-                    fmt::format("--part is I/N, from 1/N to N/N, such as 2/4; it is not '{}'", text));
+                    fmt::format("--part takes I/N, from 1/N to N/N, such as 2/4, not '{}'", text));
 }
 
 std::vector<const Case*> partOf(const std::vector<const Case*>& all, std::size_t part, std::size_t parts) {
@@ -78,7 +78,7 @@ void lookFirstIn(const std::string& directory) {
         throw Error(
             ErrorKind::Usage,
             fmt::format(
-                "--plugin-path '{}' is not a directory; it should be the one with crt_backend_<name>.so",
+                "--plugin-path '{}' is not a directory; name the one that holds crt_backend_<name>.so",
                 directory));
     const char* others = std::getenv("CRT_BACKEND_PATH");
     const std::string path =
@@ -174,7 +174,7 @@ int verify(const Arguments& arguments) {
 
 OptionGroup asked(Arguments& to) {
     const std::vector<std::string> levels{"commit", "merge", "nightly"};
-    return {"What is asked",
+    return {"Cases",
             {{.names = "--case",
               .placeholder = "NAME",
               .help = "only these: ids (A03), names (furnace), groups (H), with commas or repeated",
@@ -188,11 +188,11 @@ OptionGroup asked(Arguments& to) {
               .choices = levels},
              {.names = "--part",
               .placeholder = "I/N",
-              .help = "only every N-th of these cases, from the I-th on: N runs ask them all",
+              .help = "only every N-th of these cases, starting at the I-th: N runs cover all cases",
               .read = [&to](const std::string& text) { readPart(text, to); }},
              {.names = "--list",
               .placeholder = {},
-              .help = "show the cases and run nothing",
+              .help = "list the cases without running them",
               .read = [&to](const std::string&) { to.list = true; }}}};
 }
 
@@ -201,7 +201,7 @@ OptionGroup ofWhom(Arguments& to) {
             {backendOption(to.backend),
              {.names = "--plugin-path",
               .placeholder = "DIR",
-              .help = "look for the backend here first",
+              .help = "search for the backend here first",
               .read = [&to](const std::string& text) { to.plugin_path = text; },
               .completion = {Completion::Kind::Folder}},
              deviceOption(to.integrator), threadsOption(to.integrator)}};
@@ -211,12 +211,12 @@ OptionGroup output(Arguments& to) {
     return {"Output",
             {{.names = "-o,--output",
               .placeholder = "DIR",
-              .help = "write verify.json there, and its page, verify.html (by Python)",
+              .help = "write verify.json and the page verify.html (made by Python) there",
               .read = [&to](const std::string& text) { to.output = text; },
               .completion = {Completion::Kind::Folder}},
              {.names = "-q,--quiet",
               .placeholder = {},
-              .help = "only what fails, and the summary",
+              .help = "print only failures and the summary",
               .read = [&to](const std::string&) { to.quiet = true; }},
              {.names = "--markdown",
               .placeholder = {},
@@ -224,7 +224,7 @@ OptionGroup output(Arguments& to) {
               .read = [&to](const std::string&) { to.markdown = true; }},
              {.names = "--figures",
               .placeholder = "FILE",
-              .help = "with --markdown: a verify.json whose figures go into it; repeatable",
+              .help = "with --markdown: a verify.json whose numbers to include; repeatable",
               .read = [&to](const std::string& text) { to.suites.push_back(text); },
               .completion = completeFile({"json"}),
               .repeatable = true}}};
@@ -252,7 +252,7 @@ constexpr const char* kVerifyNotes =
 Command verifyCommand() {
     const auto to = std::make_shared<verify::Arguments>();
     return {.name = "verify",
-            .summary = "render scenes whose answer is known; exit code 7 when a backend does not find it",
+            .summary = "render scenes with known results; exit code 7 if a backend does not reproduce them",
             .groups = {verify::asked(*to), verify::ofWhom(*to), verify::output(*to)},
             .notes = verify::kVerifyNotes,
             .run = [to](const std::string&) {

@@ -21,7 +21,8 @@ struct ViewArguments {
 std::uint16_t parsePort(const std::string& text) {
     const std::uint64_t port = parseCount(text, "--port", 0);
     if (port > 65535)
-        throw Error(ErrorKind::Usage, fmt::format("--port {} is above 65535, the last one", text));
+        throw Error(ErrorKind::Usage, fmt::format("--port {} is too large: the largest port is 65535",
+                                                  text));
     return static_cast<std::uint16_t>(port);
 }
 
@@ -67,16 +68,16 @@ OptionGroup where(ViewArguments& to) {
              threadsOption(to.view.integrator),
              {.names = "--port",
               .placeholder = "N",
-              .help = "of 127.0.0.1, where the page is (a free one)",
+              .help = "port of 127.0.0.1 for the page (a free one)",
               .read = [&to](const std::string& text) { to.serve.port = parsePort(text); }},
              {.names = "--token",
               .placeholder = "SECRET",
-              .help = "in the address, instead of a random one (CRT_VIEW_TOKEN)",
+              .help = "secret in the address, instead of a random one (CRT_VIEW_TOKEN)",
               .read = [&to](const std::string& text) { to.serve.token = parseToken(text); },
               .environment = "CRT_VIEW_TOKEN"},
              {.names = "--no-open",
               .placeholder = {},
-              .help = "open no browser",
+              .help = "do not open a browser",
               .read = [&to](const std::string&) { to.serve.open_browser = false; }},
              {.names = "--tev",
               .placeholder = "HOST:PORT",
@@ -96,11 +97,11 @@ Command viewCommand() {
                            .completion = completeScene()}},
             .groups = {what(*to),
                        where(*to),
-                       {"Messages", {quietOption("only the address, warnings and errors")}}},
+                       {"Messages", {quietOption("print only the address, warnings and errors")}}},
             .notes = kViewNotes,
             .run = [to](const std::string&) {
                 if (to->view.scene.file == "-")
-                    throw Error(ErrorKind::Usage, "crt view reads its scene again and again: name a file");
+                    throw Error(ErrorKind::Usage, "crt view reads its scene repeatedly: name a file");
                 serveView(to->view, to->serve);
                 return 0;
             }};

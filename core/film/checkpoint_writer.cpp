@@ -53,7 +53,7 @@ void CheckpointWriter::save(const Film& film, FilmIdentity identity) {
 void CheckpointWriter::finish() {
     if (!writing_.valid()) return;
     if (const std::optional<Error> failure = writing_.get())
-        logWarning("{}; rendering goes on, and so do the attempts", failure->what());
+        logWarning("{}; rendering continues, and crt tries again at the next checkpoint", failure->what());
 }
 
 }  // namespace crt

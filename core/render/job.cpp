@@ -186,14 +186,14 @@ void tellTarget(const RunFacts& facts) {
     };
     if (facts.stop == StopReason::Target)
         logInfo(
-            "target error {:.3g} % reached: 95 % half-width {}, of the even pixels {}, of the odd ones {}",
+            "target error {:.3g} % reached: 95 % half-width {}, even pixels {}, odd pixels {}",
             target * 100, half_width(facts.error), half_width(facts.deciding), half_width(facts.judging));
     else if (!facts.error->known() && facts.error->rare_paths > 0)
         logInfo("the error is not yet known: surfaces mirror a light or scatter it into a narrow lobe, "
-                "single paths may bring {:.2g} times the mean luminance, and too few of them were met",
+                "single paths may carry {:.2g} times the mean luminance, and too few of them were sampled",
                 facts.error->rare_paths);
     else if (facts.target_error > 0 && !facts.error->known())
-        logInfo("whether the target error is reached cannot be told: too few paths carry the light");
+        logInfo("it is unknown whether the target error is reached: too few paths carry the light");
     if (!facts.error->known() || facts.error->half_width_95 <= target || facts.rendered_samples == 0) return;
     const auto samples = static_cast<double>(facts.samples.count());
     const stats::Interval needed = facts.error->samplesFor(target, samples);
@@ -213,7 +213,8 @@ Scene loadScene(const SceneRequest& request) {
         const auto& [x0, y0, x1, y1] = *request.crop;
         if (x0 < 0 || y0 < 0 || x0 >= x1 || y0 >= y1 || x1 > scene.film.width || y1 > scene.film.height)
             throw Error(ErrorKind::Usage,
-                        fmt::format("--crop {},{},{},{} is no rectangle within the film of {} x {} pixels",
+                        fmt::format("--crop {},{},{},{} is not a rectangle within the film of {} x {} "
+                                    "pixels",
                                     x0, y0, x1, y1, scene.film.width, scene.film.height));
         scene.film.crop = *request.crop;
     }
@@ -226,7 +227,8 @@ int runJob(const Job& job, Watch& watch) {
     // What is to be seen, and where it is to be written.
     Scene scene = loadScene(job.scene);
     if (job.expose_automatically && scene.integrator.type != IntegratorType::Path)
-        throw Error(ErrorKind::Usage, "--expose auto is for integrator.type path: views show no light");
+        throw Error(ErrorKind::Usage, "--expose auto needs integrator.type path: the other types do not "
+                                      "show light");
     if (job.target_error > 0) requireReplicates(scene);
     Files files = planFiles(job, scene);
 
@@ -277,7 +279,7 @@ int runJob(const Job& job, Watch& watch) {
     if (facts.stop == StopReason::Interrupted && run.film.samples.count() == 0)
         logInfo("stopped by {} before all pixels had a sample: there is no image", facts.request.cause);
     else if (facts.stop == StopReason::Interrupted)
-        logInfo("stopped by {}; the same command with --resume {} goes on from here", facts.request.cause,
+        logInfo("stopped by {}; the same command with --resume {} continues from here", facts.request.cause,
                 files.saved);
     return facts.exit_code;
 }

@@ -45,7 +45,7 @@ void askForReport(Session& session, RunFacts& facts) {
     try {
         facts.backend = session.report();
     } catch (const Error& error) {
-        logWarning("no report from the backend: {}", error.what());
+        logWarning("the backend gave no report: {}", error.what());
     }
     facts.devices = session.group().shares();
 }
@@ -87,7 +87,7 @@ void judge(const Film& film, const Scene& scene, RunFacts& facts) {
     warnOfBlackFilm(film, scene);
     warnOfLargeUnits(film, scene);
     if (facts.invalid_samples > 0)
-        logWarning("{} samples were no numbers (NaN or infinite) and were left out", facts.invalid_samples);
+        logWarning("{} samples were NaN or infinite and were left out", facts.invalid_samples);
 }
 
 }  // namespace
@@ -95,11 +95,11 @@ void judge(const Film& film, const Scene& scene, RunFacts& facts) {
 void requireReplicates(Scene& scene) {
     if (replicatesOf(scene) > 1) return;
     if (scene.integrator.type != IntegratorType::Path)
-        throw Error(ErrorKind::Usage, "--target-error is for integrator.type path: the views have no noise");
+        throw Error(ErrorKind::Usage, "--target-error needs integrator.type path: the other types have no "
+                                      "noise");
     if (scene.sampler.type == SamplerType::Sobol)
         throw Error(ErrorKind::Usage,
-                    "--target-error needs the replicates that sampler.replicates: 1 leaves out; add --set "
-                    "sampler.replicates=2");
+                    "--target-error needs at least 2 replicates; add --set sampler.replicates=2");
     scene.sampler.replicates = 2;
 }
 
@@ -266,7 +266,7 @@ void judgeError(Rendered& run) {
             run.facts.judging = estimate(PixelSet::Odd);
         }
     } catch (const std::bad_alloc&) {  // The film matters more than its error.
-        logWarning("out of memory on the host: the image's error is not known");
+        logWarning("out of memory on the host: the error of the image is unknown");
     }
 }
 

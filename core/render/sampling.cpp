@@ -332,9 +332,9 @@ SamplingResult sampleFilm(DeviceFilm& devices, Film& film, const SamplingPlan& p
         try {
             recoverUnread();
         } catch (const ChunkGivenUp&) {
-            logDebug("some of the samples before are lost, too");
+            logDebug("some earlier samples are lost, too");
         } catch (const std::exception& error) {
-            logWarning("some of the samples before are lost, too: {}", error.what());
+            logWarning("some earlier samples are lost, too: {}", error.what());
         }
         loseUnread();
         if (film.samples.count() == 0 && result.stop == StopReason::Time)
@@ -343,15 +343,15 @@ SamplingResult sampleFilm(DeviceFilm& devices, Film& film, const SamplingPlan& p
                                    "more --time, or lower integrator.max_depth or film.resolution",
                                    secondsSince(start))));
         else
-            logWarning("the samples that were being taken are left out: they took too long after the render "
-                       "was to stop");
+            logWarning("the samples in progress are left out: they took too long after the render was "
+                       "stopped");
     } catch (const Error& error) {
         fail(error);
     } catch (const std::bad_alloc&) {
         fail(Error(ErrorKind::Device, "out of memory on the host: a smaller film needs less"));
     } catch (const std::system_error& error) {  // A thread that cannot be started.
         fail(Error(ErrorKind::Device,
-                   fmt::format("the host refuses what rendering needs: {}", error.what())));
+                   fmt::format("the operating system refused a resource: {}", error.what())));
     }
     result.seconds = secondsSince(start);
     return result;

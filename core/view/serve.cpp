@@ -126,7 +126,7 @@ void serveView(const ViewOptions& view, const ServeOptions& serve) {
         opened = openInBrowser("file://" + folder->write("view.html", pageThatLeadsTo(address)),
                                signals.before());
     }
-    logInfo("{}; Ctrl-C ends it",
+    logInfo("{}; press Ctrl-C to stop",
             opened ? "the view is in the browser" : "open the address above in a browser");
     signals.wait();
     leaveSoon();

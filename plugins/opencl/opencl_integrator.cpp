@@ -123,7 +123,7 @@ void OpenClIntegrator::setScene(const CrtSceneBlob& blob) {
         } catch (const PluginError& error) {
             // Waves only make a render faster: it must not fail for want of memory for them.
             if (error.status() != CRT_OUT_OF_MEMORY) throw;
-            host_.log(CRT_LOG_DEBUG, std::string("opencl: going on without waves: ") + error.what());
+            host_.log(CRT_LOG_DEBUG, std::string("opencl: continuing without waves: ") + error.what());
             allocated_bytes_ = allocated;
         }
     }

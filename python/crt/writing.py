@@ -104,7 +104,7 @@ def to_file(content, remarks, path, overwrite):
     beside = path.with_name(path.stem + ".meshes")
     for there in (path, beside):
         if there.exists() and not overwrite:
-            raise Error(f"'{there}' exists already, and may have been changed by hand; --overwrite (Python: "
+            raise Error(f"'{there}' exists and may have been edited by hand; --overwrite (Python: "
                         "overwrite=True) replaces it", Kind.USAGE)
     try:
         with tempfile.TemporaryDirectory(prefix=f".{path.stem}-", dir=path.parent) as folder:

@@ -82,7 +82,7 @@ void bindFilm(nb::module_& module) {
 
     nb::class_<crt::ErrorEstimate>(
         module, "ErrorEstimate",
-        "What a film knows of its own error, relative to the mean luminance:\n"
+        "A film's estimate of its own error, relative to the mean luminance:\n"
         "relative_rmse with relative_rmse_lower and _upper is the expected error,\n"
         "over seeds, with its 95 % interval; half_width_95 is what the error of\n"
         "this image is at most, with a probability of 95 %.")
@@ -93,7 +93,7 @@ void bindFilm(nb::module_& module) {
         .def_ro("mean_luminance", &crt::ErrorEstimate::mean_luminance)
         .def("__repr__", &describeError);
     nb::class_<crt::Film>(module, "Film",
-                          "Sums of samples: what a render gives, and what images are made of.")
+                          "Sums of samples: the result of a render, from which images are made.")
         .def_static("load", &crt::Film::load, "path"_a, nb::call_guard<nb::gil_scoped_release>())
         .def("save", &crt::Film::save, "path"_a, nb::call_guard<nb::gil_scoped_release>())
         .def("__repr__", &describeFilm)

@@ -69,7 +69,7 @@ class Imports(CliTest):
         done = self.crt("import", "a.glb")
         self.assertIn("# Chosen: the file has no camera.", done.stdout)
         self.assertIn(
-            "a.glb: not in the file, and chosen: a camera that sees all of it; a grey sky and a lamp",
+            "a.glb: not in the file, and chosen: a camera that sees the whole model; a grey sky and a lamp",
             done.stderr,
         )
 
@@ -113,7 +113,7 @@ class Imports(CliTest):
                    "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
                    "0 0 0 255 0 0\n1 0 0 0 255 0\n1 1 0 0 0 255\n0 1 0 255 255 255\n4 0 1 2 3\n")
         done = self.crt("import", "a.ply", "-o", "a.yaml")
-        self.assertIn("a matt material of the colours of its vertices", done.stderr)
+        self.assertIn("a matt material with the colours of its vertices", done.stderr)
         with open(self.path("a.yaml")) as file:
             self.assertIn("reflectance: {attribute: colors}", file.read())
         small = ("--spp", "4", "--set", "film.resolution=[48,32]", "-b", BACKEND)
@@ -180,7 +180,7 @@ class Meshes(CliTest):
 
     def test_another_format_is_named(self):
         self.assertIn(
-            "mesh.obj: this is a PLY file; name it by 'ply:' in place of 'obj:'",
+            "mesh.obj: this is a PLY file; use 'ply:' instead of 'obj:'",
             self.render("ply\nformat ascii 1.0\n", expect=3),
         )
 

@@ -302,11 +302,12 @@ private:
                 throw PluginError(CRT_INVALID_ARGUMENT, "read_film was called before set_scene");
             if (view.width != self.film_.width || view.height != self.film_.height ||
                 view.channels != self.film_.channels) {
-                throw PluginError(CRT_INVALID_ARGUMENT, "the film view is not of the scene's size");
+                throw PluginError(CRT_INVALID_ARGUMENT, "the size of the film view differs from the "
+                                                        "scene's");
             }
             if (view.primitives != nullptr && !self.film_.primitives) {
                 throw PluginError(CRT_INVALID_ARGUMENT,
-                                  "the film view wants primitives, for which the scene does not ask");
+                                  "the film view has primitives, but the scene does not request them");
             }
             self.integrator_.readFilm(view);
             return CRT_OK;
@@ -348,7 +349,7 @@ CrtStatus probe(const CrtHost* host, CrtDevice* devices, std::uint32_t capacity,
                 char* reason, std::uint32_t reason_size) noexcept {
     return guarded(reason, reason_size, [&]() -> CrtStatus {
         if (count == nullptr || (devices == nullptr && capacity != 0)) {
-            throw PluginError(CRT_INVALID_ARGUMENT, "probe was called without room for an answer");
+            throw PluginError(CRT_INVALID_ARGUMENT, "probe was called without memory for its result");
         }
         *count = 0;
         const std::vector<CrtDevice> found = List(Host(host));

@@ -112,7 +112,7 @@ void ObjectReader::readMaterial(const YamlEntry& entry) {
     material_names_.push_back(entry.key);
     if (entry.key == "from_mtl" || entry.key.empty() || looksLikeNumber(entry.key)) {
         out_.error(entry.key_place,
-                   fmt::format("'{}' cannot name a material: where it is used it would mean something else",
+                   fmt::format("'{}' cannot be the name of a material: the word has another meaning there",
                                entry.key));
         return;
     }
@@ -200,8 +200,7 @@ void ObjectReader::readMaterial(const YamlEntry& entry) {
     }
     if (material.absorption && !material.isOpaque())
         section->error("opacity",
-                       "a body that absorbs is closed: where its surface is not there, light would enter it "
-                       "unseen",
+                       "an absorbing body must be closed: light would enter it through holes",
                        "leave 'opacity' or 'absorption' out");
     if (section->schema().find("thin_film") != nullptr) readThinFilm(*section, material);
     if (section->schema().find("roughness_anisotropy") != nullptr) readAnisotropy(*section, material);
@@ -211,7 +210,7 @@ void ObjectReader::readMaterial(const YamlEntry& entry) {
 void ObjectReader::readThinFilm(const SectionReader& section, Material& material) {
     if (!section.has("thin_film")) return;
     const std::optional<SectionReader> film =
-        section.section("thin_film", fmt::format("the film of material '{}'", material.name));
+        section.section("thin_film", fmt::format("the thin film of material '{}'", material.name));
     if (!film) return;
     film->read("thickness_nm", material.film_thickness_nm);
     if (std::optional<Spectrum> index = spectra_.read(*film, "ior", SpectrumUse::Index))
@@ -222,9 +221,9 @@ void ObjectReader::readThinFilm(const SectionReader& section, Material& material
         material.film_thickness_nm *= relative;
     } else if (material.type == MaterialType::RoughDielectric) {
         film->error("relative_thickness",
-                    "a film on a rough_dielectric is equally thick everywhere: what its microfacets lose is "
-                    "tabulated for one thickness",
-                    "leave 'relative_thickness' out, give a number, or take a dielectric");
+                    "a thin film on a rough_dielectric needs a uniform thickness, because the energy loss "
+                    "of its microfacets is tabulated for one thickness",
+                    "remove 'relative_thickness', give a number, or use a dielectric");
     } else {
         material.film_texture =
             textures_.read(*film, "relative_thickness", TexelKind::Numbers).value_or(kNoTexture);
@@ -307,14 +306,14 @@ std::optional<Matrix4d> ObjectReader::readPlacement(const YamlNode& list, const 
             if (m[12] != 0 || m[13] != 0 || m[14] != 0 || m[15] != 1)
                 step->error("matrix", "the last row must be 0 0 0 1: points stay points");
             else if (std::abs(relativeVolume(m)) < kFlat)
-                step->error("matrix", "this matrix cannot be inverted: it flattens the object");
+                step->error("matrix", "this matrix is not invertible: it flattens the object");
         }
         good &= out_.count() == before;
         total = multiply(m, total);
     }
     if (good && !allFinite(total)) {
         out_.error(place,
-                   fmt::format("{} overflows: its steps multiply to numbers beyond a double", subject));
+                   fmt::format("{} overflows: the product of its steps is too large for a double", subject));
         good = false;
     }
     if (!good) return std::nullopt;
@@ -331,7 +330,7 @@ std::vector<Matrix4d> ObjectReader::readPlacements(const SectionReader& object) 
     if (list == nullptr) return {kIdentity4d};
     if (list->items.empty())
         object.error("transforms",
-                     "an object with no placement is nowhere; leave 'transforms' out for one as it is");
+                     "an object without placements is invisible; leave 'transforms' out for a single one");
     placements_ += list->items.size();
     requireRoom(object.place("transforms"));
     std::vector<Matrix4d> placements;
@@ -391,7 +390,7 @@ std::optional<std::uint32_t> ObjectReader::readMesh(const SectionReader& section
                 polygon.push_back(static_cast<std::uint32_t>(index));
             else
                 out_.error(item->place,
-                           fmt::format("face {} names position {}, but there are only {} (counted from 0)",
+                           fmt::format("face {} uses position {}, but there are only {} (counted from 0)",
                                        f, index, mesh.positions.size()));
         }
         if (polygon.size() != face.items.size()) continue;
@@ -471,7 +470,7 @@ void ObjectReader::readObject(const YamlNode& node, const YamlPlace& place, std:
     if (!section.has("obj")) {
         if (!section.has("material"))
             out_.error(place, fmt::format("'material' is missing in {}", section.subject()));
-        if (material_given && !named) section.error("material", "only an OBJ has materials of its own");
+        if (material_given && !named) section.error("material", "only an OBJ has its own materials");
     }
     if ((section.has("obj") || section.has("ply")) && !section.has("mesh")) {
         mesh = readMeshFile(section, readMeshUse(section, material_name));
@@ -489,8 +488,8 @@ void ObjectReader::readObject(const YamlNode& node, const YamlPlace& place, std:
         mesh = known->second;
         refuseObjKeys(section);
         if (section.has("vertex_colors"))
-            section.error("vertex_colors", "this is about the colours in a PLY",
-                          "a mesh that is written out has 'color_space'");
+            section.error("vertex_colors", "this key needs colours from a PLY",
+                          "a 'mesh' has its own 'color_space'");
     }
     object.emission = readEmission(section, object.material, material_name).value_or(-1);
     if (mesh && !object.shape && scene_.meshes[*mesh].triangles.empty())

@@ -9,13 +9,13 @@ void ObjectReader::readAnisotropy(const SectionReader& section, Material& materi
     if (!(material.anisotropy > 0)) return;
     if (material.roughness_texture != kNoTexture)
         section.error("roughness_anisotropy",
-                      "an anisotropic surface is equally rough everywhere: what its microfacets lose is "
-                      "tabulated for one roughness",
+                      "an anisotropic surface needs a uniform roughness, because the energy loss of its "
+                      "microfacets is tabulated",
                       "give 'roughness' a number, or leave 'roughness_anisotropy' out");
     if (material.type == MaterialType::RoughDielectric && material.film_thickness_nm > 0)
         section.error("roughness_anisotropy",
-                      "a rough_dielectric under a film is as rough in every direction: what its microfacets "
-                      "lose is tabulated by wavelength already",
+                      "a rough_dielectric under a thin film must be isotropic, because the energy loss of "
+                      "its microfacets is tabulated by wavelength",
                       "leave 'thin_film' or 'roughness_anisotropy' out");
 }
 
