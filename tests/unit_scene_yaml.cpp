@@ -380,7 +380,7 @@ TEST_CASE("errors in overrides name the argument", "[scene_yaml][override][refus
     CHECK_THAT(refusedOverride(body, "film.resolution=[0,"),
                Contains("--set film.resolution: error: not valid YAML"));
     CHECK_THAT(refusedOverride(body, "film.resolution="),
-               Contains("--set film.resolution: error: there is no value after '='"));
+               Contains("--set film.resolution: error: the value after '=' is missing"));
     CHECK_THAT(refusedOverride(body, "materials.rde.reflectance=1"),
                Contains("there is no 'rde' in 'materials'") && Contains("did you mean 'red'?"));
     CHECK_THAT(refusedOverride(body, "objects.1.material=red"),

@@ -29,17 +29,18 @@ namespace {
 constexpr int kDifferent = 7;
 
 constexpr const char* kCompareHelp = R"(
-What is printed: whether the bits are the same; where the first difference is, with both values and how many
-floats lie between them (ulp); errors over all values of R, G and B; what it looks like (FLIP, Delta E).
-Where an image says how large its noise is (output AOV 'variance' or 'error', or a reference of 'crt
-reference'), also whether the difference is noise or bias: the bias of each channel with its 99.9 %
-interval, and how many tiles and pixels differ by more than noise would let any of them (alpha 0.1 %). One
-NaN or infinity voids all of it: nothing is dropped.
+Prints whether the bits are the same; the first difference, with both values and the number of floats
+between them (ulp); errors over all values of R, G and B; and the perceived difference (FLIP, Delta E). If
+an image states its noise (output AOV 'variance' or 'error', or a reference of 'crt reference'), it also
+prints whether the difference is noise or bias: the bias of each channel with its 99.9 % interval, and the
+number of tiles and pixels that differ by more than noise allows (alpha 0.1 %). A single NaN or infinity
+makes the whole comparison void; no value is dropped.
 
-With --backends, the scene is rendered with one seed by all, which crt's own backends do to the same bits,
-and with other seeds for a verdict: PASS when the 99.9 % interval of the means' difference lies within
-+-delta and no tile and no pixel differs by more than noise, FAIL when one does for certain, INCONCLUSIVE
-when more samples are needed or one value carries too much of the error. The exit code is 7 unless all PASS.
+With --backends, every backend renders the scene with the same seed, for which crt's own backends give the
+same bits, and with different seeds for a verdict: PASS if the 99.9 % interval of the difference of the
+means lies within +-delta and no tile and no pixel differs by more than noise, FAIL if one does for
+certain, INCONCLUSIVE if more samples are needed or one value carries too much of the error. The exit code
+is 7 unless all PASS.
 
 Examples:
   crt compare cuda.exr embree.exr                        are they the same bits?

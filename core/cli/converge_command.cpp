@@ -27,7 +27,7 @@ struct State {
 
 OptionGroup what(State& state) {
     converge::ConvergeRequest& request = state.request;
-    OptionGroup group{"What is measured"};
+    OptionGroup group{"Measurement"};
     group.options = {
         {.names = "--backends",
          .placeholder = "X,Y",
@@ -77,7 +77,7 @@ OptionGroup what(State& state) {
 
 OptionGroup where(State& state) {
     converge::ConvergeRequest& request = state.request;
-    return {"Where",
+    return {"Device and output",
             {deviceOption(request.integrator), threadsOption(request.integrator),
              {.names = "-o,--output",
               .placeholder = "DIR",
@@ -92,11 +92,13 @@ OptionGroup where(State& state) {
 }
 
 constexpr const char* kConvergeNotes =
-            "\nRenders every scene with every backend and variant, again and again with other seeds, looks "
-            "at 1, 2, 4 ... samples, and writes one\n"
-            "page: error against seconds with its interval, efficiency, bias, whether the images' own error "
-            "estimates hold, where the time goes.\n"
-            "Where no --reference is given, a quarter of --time makes one.\n"
+            "\nRenders every scene with every backend and variant, repeatedly with different seeds, "
+            "measures "
+            "the error at 1, 2, 4 ... samples, and writes\n"
+            "one page: error against seconds with its interval, efficiency, bias, reliability of the "
+            "images' "
+            "own error estimates, and time by stage.\n"
+            "Without --reference, a quarter of --time is spent on making one.\n"
             "docs/error.md explains the terms. Python makes the page, with jinja2 and matplotlib; "
             "'python -m crt report DIR' does it later.\n"
             "\nExamples:\n"

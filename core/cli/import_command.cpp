@@ -17,13 +17,13 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kImportNotes = R"(
-The scene names the model, whose meshes and images stay where they are: materials, lights and camera are
-there to be changed. What crt does not have, and what it chose, is said in a warning and at the top of the
-scene.
+The scene refers to the model, whose meshes and images stay in their files; its materials, lights and camera
+are written out for editing. A warning, and a comment at the top of the scene, list the features that crt
+ignores or approximates and the values that it chose.
 
   crt import product.glb -o product.yaml
   crt product.yaml --spp 256
-  crt product.glb               the same picture, without the scene in between
+  crt product.glb               the same image, without writing a scene
 )";
 
 struct Request {

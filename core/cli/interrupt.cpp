@@ -39,7 +39,8 @@ extern "C" void onSignal(int signal) {
     // The time first: a second signal on another thread must never see a signal without its time.
     g_first_at = monotonicNanoseconds();
     g_signal = signal;
-    constexpr std::string_view text = "\ncrt: finishing the running chunk; once more to leave at once\n";
+    constexpr std::string_view text = "\ncrt: finishing the current chunk; press Ctrl-C again to stop "
+                                      "immediately\n";
     // A terminal has just shown ^C on the line of the bar, so a person there gets an answer; a log file is
     // told by the report.
     if (signal == SIGINT && isatty(STDERR_FILENO) != 0 &&

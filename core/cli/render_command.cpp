@@ -14,7 +14,7 @@ namespace crt {
 namespace {
 
 OptionGroup what(Job& job) {
-    OptionGroup group{"What is rendered"};
+    OptionGroup group{"Samples and scene"};
     group.options = {
         {.names = "--spp",
          .placeholder = "N",
@@ -43,7 +43,7 @@ OptionGroup what(Job& job) {
 OptionGroup where(Job& job) {
     const std::vector<std::string> kernels{"lean", "full", "lean-only"};
     return {
-        "Where",
+        "Device",
         {backendOption(job.backend), deviceOption(job.integrator), threadsOption(job.integrator),
          {.names = "--kernel",
           .placeholder = "KIND",

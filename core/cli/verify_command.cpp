@@ -231,20 +231,20 @@ OptionGroup output(Arguments& to) {
 }
 
 constexpr const char* kVerifyNotes =
-            "\nThe suite asks a backend what physics, geometry and arithmetic demand: closed forms, "
+            "\nThe suite checks a backend against physics, geometry and arithmetic: closed forms, "
             "deterministic quadrature, relations between\n"
-            "images. A case passes, is refused as documented, does not apply (and says why), is "
-            "INCONCLUSIVE (the noise hides the answer) or\n"
-            "FAILS; the last two make the exit code 7, and the line below says what the figures suggest. "
+            "images. A case passes, is refused as documented, does not apply (with the reason), is "
+            "INCONCLUSIVE (the noise is too large) or\n"
+            "FAILS; the last two make the exit code 7, and the line below suggests a cause. "
             "docs/stability.md describes every case.\n"
             "\nExamples:\n"
             "  crt verify                                          the level for every commit, on the best "
             "backend\n"
-            "  crt verify --backend opencl --level merge -o out    minutes of it, with out/verify.json and "
+            "  crt verify --backend opencl --level merge -o out    a few minutes, with out/verify.json and "
             "out/verify.html\n"
             "  crt verify --case furnace,A03,H                     two cases and a whole group\n"
             "  crt verify --backend mine --plugin-path build       a backend of your own\n"
-            "  crt verify --list --level nightly                   everything there is\n";
+            "  crt verify --list --level nightly                   all cases\n";
 
 }  // namespace
 }  // namespace verify

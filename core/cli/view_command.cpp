@@ -35,15 +35,15 @@ std::string parseToken(const std::string& text) {
 }
 
 constexpr const char* kViewNotes =
-    "\nThe page shows the image as it converges. Dragging turns the camera around its target, with Shift or "
-    "the right button it is\n"
-    "moved, the wheel goes nearer and farther; a click shows what the film knows of a pixel, and Ctrl with "
-    "a "
-    "click focuses a lens.\n"
-    "The scene is read again whenever a file that it is made of changes. The address holds a secret: who "
-    "knows it, can see the\n"
-    "image and change the view. From elsewhere: ssh -L 8080:127.0.0.1:8080 HOST, and there crt view --port "
-    "8080.\n"
+    "\nThe page shows the image as it converges. Drag to turn the camera around its target, or with Shift "
+    "or "
+    "the right button to move it;\n"
+    "the wheel changes the distance. A click shows the data of a pixel, and Ctrl with a click focuses a "
+    "lens.\n"
+    "crt reads the scene again whenever one of its files changes. The address contains a secret: everyone "
+    "who has it can see the\n"
+    "image and change the view. For remote access: ssh -L 8080:127.0.0.1:8080 HOST, and there crt view "
+    "--port 8080.\n"
     "\nExamples:\n"
     "  crt view scene.yaml                           opens a browser, or prints the address\n"
     "  crt view scene.yaml --set film.resolution=[640,360] --spp 4096\n"
@@ -51,7 +51,7 @@ constexpr const char* kViewNotes =
     "  crt view scene.yaml --tev localhost:14158     in the viewer tev as well\n";
 
 OptionGroup what(ViewArguments& to) {
-    OptionGroup group{"What is shown"};
+    OptionGroup group{"Scene"};
     group.options = {
         {.names = "--spp",
          .placeholder = "N",
@@ -62,7 +62,7 @@ OptionGroup what(ViewArguments& to) {
 }
 
 OptionGroup where(ViewArguments& to) {
-    return {"Where",
+    return {"Device and address",
             {backendOption(to.view.backend),
              deviceOption(to.view.integrator),
              threadsOption(to.view.integrator),

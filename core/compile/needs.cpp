@@ -81,7 +81,7 @@ LeftOut leftOut(const Scene& scene, const kernel::CrtScene& header, std::size_t 
                                           header.shapes.count > 0 ? "triangles and shapes" : "triangles",
                                           kBruteForceTriangles)
                             : std::string("integrator.accelerator selects another structure"));
-    if (without_nodes) left_out("BVH", "the backend builds an acceleration structure of its own");
+    if (without_nodes) left_out("BVH", "the backend builds its own acceleration structure");
     const std::size_t triangles = header.triangle_count - header.shapes.count - header.instances.count;
     if (has(CRT_FEATURE_NEE) && has(CRT_FEATURE_BRUTE_FORCE) && occluders < triangles)
         left_out("shadow tests",

@@ -532,7 +532,7 @@ std::vector<std::string> differingTraits(const FilmRecord& found, const FilmReco
                 fmt::format("{} {} {}, not {}", want.name, plural ? "are" : "is", have->text, want.text));
         else
             sentences.push_back(fmt::format("{} {} ({} in both)", want.name,
-                                            plural ? "are others" : "is another", have->text));
+                                            plural ? "differ" : "differs", have->text));
     }
     return sentences;
 }

@@ -91,7 +91,7 @@ def to_text(content, remarks):
     """The scene with its meshes written out, for where there is no folder to put files into."""
     content = relative(content, pathlib.Path.cwd())
     if has_image(content):
-        raise Error("the scene holds images, which crt reads from files of their own: write the scene to a "
+        raise Error("the scene holds images, which crt reads from separate files: write the scene to a "
                     "file (crt import: -o FILE; Python: scene.save)", Kind.USAGE)
     return yaml(plain(content), remarks)
 

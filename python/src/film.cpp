@@ -65,7 +65,7 @@ crt::Image develop(const crt::Film& film, bool for_display, std::optional<double
 
 nb::str describeError(const crt::ErrorEstimate& error) {
     return nb::str(
-               "<crt.ErrorEstimate {:.3g} % ({:.3g} to {:.3g} %) expected, of this image at most {:.3g} %>")
+               "<crt.ErrorEstimate {:.3g} % ({:.3g} to {:.3g} %) expected; this image: at most {:.3g} %>")
         .format(100 * error.relative_rmse, 100 * error.relative_rmse_lower, 100 * error.relative_rmse_upper,
                 100 * error.half_width_95);
 }
@@ -107,7 +107,7 @@ void bindFilm(nb::module_& module) {
         .def_prop_ro("counts", &countsOf, nb::rv_policy::automatic)
         .def_prop_ro("error", &crt::Film::error)
         .def("error_within", &crt::Film::errorWithin, "target"_a,
-             "Whether `crt render --target-error` would stop: half_width_95 is at most the target for all\n"
+             "True if `crt render --target-error` would stop: half_width_95 is at most the target for all\n"
              "pixels, and for the even and for the odd ones of a checkerboard.",
              nb::call_guard<nb::gil_scoped_release>())
         .def("develop", &develop, "for_display"_a = false, "exposure_ev"_a = nb::none(),

@@ -69,7 +69,8 @@ class Imports(CliTest):
         done = self.crt("import", "a.glb")
         self.assertIn("# Chosen: the file has no camera.", done.stdout)
         self.assertIn(
-            "a.glb: not in the file, and chosen: a camera that sees the whole model; a grey sky and a lamp",
+            "a.glb: not in the file, so crt chose: a camera that sees the whole model; a grey sky and a "
+            "lamp",
             done.stderr,
         )
 
@@ -150,9 +151,8 @@ class Meshes(CliTest):
     def test_a_mesh_without_materials_is_refused_with_the_line_to_add(self):
         said = self.render("mtllib lost.mtl\n" + SQUARE + "usemtl red\nf 1 2 3 4\n", keys="", expect=3)
         self.assertIn(
-            "mesh.yaml:5:17: error: 2 of 2 triangles of object 0 have no material (the OBJ names "
-            "'lost.mtl', "
-            "which is not there); "
+            "mesh.yaml:5:17: error: 2 of 2 triangles of object 0 have no material (the OBJ refers to "
+            "'lost.mtl', which does not exist); "
             "give them one with 'material: NAME'",
             said,
         )
@@ -162,8 +162,9 @@ class Meshes(CliTest):
     def test_the_same_mesh_renders_with_one(self):
         said = self.render("mtllib lost.mtl\n" + SQUARE + "usemtl red\nf 1 2 3 4\n")
         self.assertIn(
-            "warning: mesh.obj: material 'red' is not defined, and no file 'lost.mtl' is there: 2 of 2 "
-            "triangles have none of their own",
+            "warning: mesh.obj: material 'red' is not defined, and the file 'lost.mtl' does not exist: 2 of "
+            "2 "
+            "triangles have no material",
             said,
         )
 
@@ -186,7 +187,7 @@ class Meshes(CliTest):
 
     def test_an_index_that_leads_nowhere_is_refused_with_its_line(self):
         self.assertIn(
-            "mesh.obj:6: a face names vertex 7, but the file has 4",
+            "mesh.obj:6: a face uses vertex 7, but the file has 4",
             self.render(SQUARE + "f 1 2 3\nf 1 2 7\n", expect=3),
         )
 

@@ -289,7 +289,7 @@ private:
             const std::size_t more = undefined.size() > kMostNamed ? undefined.size() - kMostNamed : 0;
             undefined.resize(undefined.size() - more);
             logWarning(
-                "{}: material{} {}{} not defined{}: {} of {} have no material of their own", path_,
+                "{}: material{} {}{} not defined{}: {} of {} have no material", path_,
                 undefined.size() + more == 1 ? "" : "s", fmt::join(undefined, ", "),
                 more > 0                ? fmt::format(" and {} more are", more)
                 : undefined.size() == 1 ? " is"

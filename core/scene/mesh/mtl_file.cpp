@@ -70,7 +70,8 @@ const std::vector<MtlKey>& mtlKeys() {
         {"crt_reflectance",
          {},
          "file",
-         "A measured spectrum (`.spd`, `.csv`) in place of Kd or Ks, looked up beside the MTL; clamped "
+         "A measured spectrum (`.spd`, `.csv`) in place of Kd or Ks, looked up in the folder of the MTL; "
+         "clamped "
          "beyond its ends. Known to crt only."},
         {"Ns",
          {},
@@ -87,7 +88,8 @@ const std::vector<MtlKey>& mtlKeys() {
          {},
          "image",
          "A texture that replaces `Kd`, on faces with `vt`: sRGB for 8 and 16 bits. "
-         "Looked up beside the MTL, with `/` for `\\`, without its folders, and in another letter case. "
+         "Looked up in the folder of the MTL, with `/` for `\\`, without its folders, and in another letter "
+         "case. "
          "`-s`, `-o` and "
          "`-clamp` are read. If the file cannot be read, crt warns and uses `Kd`; a black `Kd`, which "
          "exporters write together with a texture, counts as grey 0.6."},

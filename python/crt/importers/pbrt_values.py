@@ -90,7 +90,7 @@ class Values:
             return {"illuminant": NEAREST_ILLUMINANT[name]}
         path = self.state.file(place, name)
         if not path.is_file():
-            refuse(place, f"'{name}' is no spectrum of pbrt, and '{path}' does not exist")
+            refuse(place, f"'{name}' is not a spectrum of pbrt, and '{path}' does not exist")
         try:
             return spectra.table(*spectra.read_spd(path), outside)
         except (OSError, ValueError) as error:

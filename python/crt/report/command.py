@@ -22,7 +22,7 @@ def arguments_of(typed):
     parser.add_argument("-o", "--output", metavar="FILE", type=pathlib.Path,
                         help="the page to write, instead of one in DIR")
     parser.add_argument("--figures", metavar="FOLDER", type=pathlib.Path,
-                        help="also write every figure there, as SVG files of their own")
+                        help="also write every figure there, as separate SVG files")
     return parser.parse_args(typed)
 
 
