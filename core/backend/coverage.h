@@ -1,4 +1,4 @@
-/// Which samples of which pixels a backend's film holds.
+/// The samples of each pixel that a backend's film holds.
 #pragma once
 
 #include "base/error.h"
@@ -21,7 +21,7 @@ inline bool overlap(const Rectangle& a, const Rectangle& b) {
     return a[0] < b[2] && b[0] < a[2] && a[1] < b[3] && b[1] < a[3];
 }
 
-/// Which samples the backend's film holds. A film knows ranges of samples that every pixel has; ranges
+/// The samples that the backend's film holds. A film records ranges of samples that every pixel has; ranges
 /// rendered rectangle by rectangle are held back here until their rectangles cover the window.
 class Coverage {
 public:

@@ -19,7 +19,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// Of what a backend counts from zero on with every scene.
+/// Counters that a backend starts from zero with every scene.
 void addCounts(const CrtBackendReport& from, CrtBackendReport& to) {
     to.paths += from.paths;
     to.closest_rays += from.closest_rays;
@@ -54,8 +54,8 @@ std::uint64_t samplesOf(const std::vector<RenderRange>& ranges) {
     return samples;
 }
 
-/// `count` in whole parts, as `weights` are to one another. What rounding leaves goes to the largest
-/// remainders, of equal ones to the first.
+/// `count` in whole parts, as `weights` are to one another. The remainder after rounding goes to the largest
+/// fractions, and among equal ones to the first.
 std::vector<std::uint64_t> shareOut(std::uint64_t count, const std::vector<double>& weights) {
     double all = 0;
     for (const double weight : weights) all += weight;
@@ -104,9 +104,9 @@ struct DeviceGroup::Member {
     double samples_per_second = 0;  ///< Of the last range; 0: not measured.
     /// Its film as it was read last, with several devices only: what is in there outlives the device.
     std::optional<Film> read;
-    std::vector<RenderRange> unread;  ///< What its own film has besides.
+    std::vector<RenderRange> unread;  ///< The samples that only its own film has.
     bool lacks_room = false;  ///< Dropped for want of memory, and nothing else.
-    std::uint64_t pixel_samples = 0;  ///< What share.samples stands for: a window may be a part of the film.
+    std::uint64_t pixel_samples = 0;  ///< share.samples times pixels: a window may be smaller than the film.
     bool has_scene = false;           ///< And what it counts belongs to it.
     CrtBackendReport earlier{};  ///< Of other windows of this scene: what backends count from zero on again.
 
@@ -127,7 +127,7 @@ struct DeviceGroup::Member {
     }
 };
 
-/// What one device is to render.
+/// The work of one device.
 struct DeviceGroup::Assignment {
     Member* member;
     std::vector<RenderRange> ranges;
@@ -273,13 +273,14 @@ void DeviceGroup::setWindow(const CompiledScene& scene) {
     loadScene(scene, {});
 }
 
-/// Who renders what: of ranges of all pixels each device a share as large as it is fast. A film knows
-/// samples that every pixel has, and so the rectangles of a range must meet on one device.
+/// Distributes the work: each device gets a share of the ranges of all pixels in proportion to its speed. A
+/// film records samples that every pixel has, and so the rectangles of a range must meet on one device.
 std::vector<DeviceGroup::Assignment> DeviceGroup::divide(const std::vector<RenderRange>& ranges) {
     const std::vector<Member*> there = working();
     std::vector<Assignment> work;
     std::vector<double> weights;
-    // Who was not measured yet is as much faster or slower than the others as the scores say.
+    // A device without a measurement is assumed to be as much faster or slower than the others as the scores
+    // suggest.
     double measured = 0, measured_score = 0;
     for (const Member* member : there) {
         if (member->samples_per_second <= 0) continue;
@@ -315,7 +316,7 @@ std::vector<DeviceGroup::Assignment> DeviceGroup::divide(const std::vector<Rende
     return work;
 }
 
-/// What was only in the films of devices that have failed, to be rendered again.
+/// The samples that only the films of failed devices held, to be rendered again.
 std::vector<RenderRange> DeviceGroup::collectLost() {
     std::vector<RenderRange> lost;
     for (const auto& member : members_) {

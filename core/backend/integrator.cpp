@@ -115,7 +115,7 @@ struct Integrator::Impl {
     Impl(const Impl&) = delete;
     Impl& operator=(const Impl&) = delete;
 
-    /// Not a call(): what a plugin says while it ends goes to whoever made the last one.
+    /// Not a call(): messages of a plugin while it ends go to the maker of the last call.
     void destroy() noexcept {
         if (!std::exchange(created, false) || table.destroy == nullptr) return;
         try {
@@ -176,8 +176,8 @@ struct Integrator::Impl {
         }
     }
 
-    /// Why the plugin was given no text of a kernel, if that happened: thrown where the verb failed, for it
-    /// is the reason, and logged where the plugin goes on without.
+    /// Reason why the plugin got no kernel text, if any: thrown if the verb failed, because it is the cause,
+    /// and logged if the plugin continues without the text.
     void tellKernelError(CrtStatus status) {
         std::exception_ptr error;
         {

@@ -90,7 +90,7 @@ bool isStandardOutput(const std::string& path) { return path == "-" || path.rfin
 
 namespace {
 
-/// A name of its own in the folder of a file: the file's, which is cut where both would be too long.
+/// A unique name in the folder of a file: the file's name, cut if the result would be too long.
 std::string temporaryBeside(const std::string& file, int attempt) {
     constexpr std::size_t kLongestName = 255;
     const std::string end = fmt::format(".{}-{}.tmp", ::getpid(), attempt);
@@ -174,7 +174,7 @@ void AtomicFile::openStreamed() {
                             std::strerror(error_number)));
 }
 
-/// What was written under the temporary name, by write() or by a library, to standard output.
+/// Copies the bytes under the temporary name, written by write() or by a library, to standard output.
 void AtomicFile::stream() {
     std::fflush(stdout);
     const int source = ::open(temporary_.c_str(), O_RDONLY | O_CLOEXEC);

@@ -81,7 +81,7 @@ std::string nameOfGroup(gid_t group) {
     return std::to_string(group);
 }
 
-/// Whether a group has no members but one trusted user: the group of the user's name that systems with "user
+/// True if a group has no members but one trusted user: the group of the user's name that systems with "user
 /// private groups" make, under which a umask of 002 is harmless.
 bool privateGroup(gid_t group) {
     std::vector<char> group_texts = room(), user_texts = room();
@@ -145,7 +145,8 @@ std::string cannotBeOpened(const std::string& name, int error) {
     return inQuotationMarks(name) + " cannot be opened: " + std::strerror(error);
 }
 
-/// Why a folder may not lead to code; empty if it may. `entry`: the path in it that is looked up next.
+/// Reason why a folder may not lead to code; empty if it may. `entry`: the path in it that is looked up
+/// next.
 std::string whyNotIn(const std::string& folder, const std::string& entry, const std::string& home) {
     if (program().known && isAbove(folder, program().path)) return {};
     if (isAbove(folder, home) && (entry == home || isAbove(entry, home))) return {};
@@ -202,7 +203,7 @@ Judged follow(const std::string& name) {
     return way;
 }
 
-/// Why a file that was followed may not be run; `name`: as messages call it.
+/// Reason why a file at the end of links may not be run; `name`: as messages call it.
 std::string whyNotFile(const std::string& path, const std::string& name) {
     // On the descriptor: not blocking, for a pipe waits for who writes to it.
     const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY | O_NOFOLLOW);

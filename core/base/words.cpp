@@ -20,7 +20,7 @@ std::string lowerCase(std::string_view text) {
     return lower;
 }
 
-/// Why `text` is no decimal number, or nothing.
+/// Reason why `text` is not a decimal number, or nothing.
 std::string notDecimal(const std::string& text) {
     std::string_view body = text;
     if (!body.empty() && (body.front() == '+' || body.front() == '-')) body.remove_prefix(1);

@@ -137,7 +137,7 @@ int compareFiles(const CompareArguments& arguments) {
 
     const Comparison comparison{&result, noise ? &*noise : nullptr, reference ? &*reference : nullptr};
     print(arguments, comparisonText(comparison), comparisonJson(comparison));
-    // What was asked for and cannot be is an error, and not an answer that leaves it out.
+    // An output that was requested and cannot be made is an error; crt does not silently leave it out.
     if (!result.mismatch.empty()) requireNothingMore(arguments, result.mismatch);
     if (!arguments.difference_file.empty()) writeDifference(arguments.difference_file, a, b);
     if (!arguments.map_file.empty()) {

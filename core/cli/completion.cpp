@@ -9,7 +9,7 @@
 namespace crt {
 namespace {
 
-/// What crt brings; others are typed.
+/// The names that come with crt; others must be typed.
 const std::vector<std::string> kBackends{"auto", "cuda", "embree", "opencl"};
 
 std::vector<std::string> namesOf(const Option& option) {

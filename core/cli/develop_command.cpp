@@ -157,7 +157,7 @@ std::uint32_t aovsNamed(const std::vector<std::string>& names) {
     return aovs;
 }
 
-/// What can be refused before films, which may be large, are read.
+/// Refusals that are possible before the films, which may be large, are read.
 OutputPlan planDevelopment(const DevelopArguments& arguments) {
     OutputPlan plan = planOutputs(arguments.outputs, Scene{});
     if (!plan.films.empty())

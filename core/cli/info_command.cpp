@@ -238,7 +238,7 @@ void showImage(const std::string& file) {
         printRow(key.c_str(), key == kWhiteLuminanceKey ? value + " cd/m² at (1, 1, 1)" : value);
 }
 
-/// What a scene needs, or what a film or an image holds, by the name's extension.
+/// Describes a scene, a film or an image, by the extension of its name.
 int showInfo(const SceneRequest& what, bool verbose) {
     if (std::filesystem::path(what.file).extension() == kCheckpointExtension) {
         showFilm(what.file);

@@ -47,7 +47,7 @@ int main(int argc, char** argv) {
         return code;
     } catch (const crt::Error& error) {
         const std::string text = error.what();
-        // Errors in a scene come with places of their own, which editors find only at the start of a line.
+        // Errors in a scene already contain their places, which editors find only at the start of a line.
         const bool has_places = text.find(": error: ") != std::string::npos;
         crt::logMessage(crt::LogLevel::Error,
                         (has_places ? "the scene cannot be rendered as it is:\n" : "") + text);

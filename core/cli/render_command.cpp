@@ -144,7 +144,7 @@ Command renderCommand() {
             .notes = programExamples(),
             .run = [state](const std::string& typed) {
                 state->job.command = typed;
-                // In a pipe nobody looks for a report that was not asked for.
+                // A pipe needs no report unless it was requested.
                 const bool streamed =
                     !state->job.outputs.empty() && isStandardOutput(state->job.outputs.front());
                 if (streamed && !state->job.report_file) state->job.report_file = "";

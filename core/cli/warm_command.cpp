@@ -22,7 +22,7 @@ struct State {
     IntegratorOptions integrator{};
 };
 
-/// How the backend came by its kernels.
+/// Origin of the backend's kernels.
 std::string kernelText(const CrtBackendReport& report) {
     if (report.kernel_from_cache != 0) return "from the cache";
     if (report.compile_seconds > 0) return fmt::format("compiled in {:.1f} s", report.compile_seconds);

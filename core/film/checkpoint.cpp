@@ -135,7 +135,7 @@ std::uint64_t tailBytes(const Header& h) {
 /// Size of the part before the film.
 Wide headBytes(const Header& h) { return Wide{tailBytes(h)} + sizeof(Header); }
 
-/// Whether the header can describe a file of its size.
+/// True if the header can describe a file of its size.
 bool sizesFit(const Header& h) {
     if (h.header_bytes != headBytes(h)) return false;
     if (h.format_version > kCheckpointVersionUnpacked)
@@ -311,7 +311,7 @@ std::pair<Film, FilmIdentity> readCheckpoint(const std::string& path) {
 
 namespace {
 
-/// What `found` has and `expected` has not, in words.
+/// The traits that `found` has and `expected` lacks, in words.
 std::string differenceText(const FilmIdentity& found, const FilmIdentity& expected) {
     std::vector<std::string> differences;
     if (found.record && expected.record) differences = differingTraits(*found.record, *expected.record);

@@ -10,7 +10,7 @@
 namespace crt {
 namespace {
 
-/// What went wrong, if anything did.
+/// The error, if any.
 std::optional<Error> tryTo(const CheckpointWriter::Write& write, const Film& film,
                            const FilmIdentity& identity) {
     try {

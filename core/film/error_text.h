@@ -1,4 +1,4 @@
-/// What an image knows of its error, as text.
+/// The error estimate of an image, as text.
 #pragma once
 
 #include "film/error_estimate.h"

@@ -190,7 +190,7 @@ Image resolveImage(const Film& film, const Development& development, std::uint32
     });
 
     image.chromaticities = chromaticities(space);
-    // Who rendered it, where and when is for the caller to add.
+    // The caller adds who rendered it, where and when.
     image.metadata = {{kColorInteropIdKey, spaceName(space)},
                       {"crt/spp", std::to_string(film.samples.count())},
                       {"crt/sampleRanges", film.samples.text()},

@@ -59,7 +59,7 @@ std::vector<Face> oneSidedFaces(const Scene& scene, const Object& object) {
     return faces;
 }
 
-/// How far a shape is from the middle of its frame at most.
+/// Largest distance of a shape from the origin of its frame.
 double radiusAround(const Quadric& shape, const Matrix4d& transform) {
     const double scale = evenScaleOf(transform).value_or(std::numeric_limits<double>::infinity());
     const double z = std::max(std::abs(shape.from_z), std::abs(shape.to_z));
@@ -114,7 +114,7 @@ std::string nameOf(const Object& object) {
     return object.name.empty() ? "an object without a name" : fmt::format("'{}'", object.name);
 }
 
-/// What may be wrong in this scene.
+/// Possible causes in this scene.
 std::vector<std::string> reasonsForBlack(const Scene& scene) {
     std::vector<std::string> lamps, one_sided;
     for (const Object& object : scene.objects) {

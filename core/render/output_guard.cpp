@@ -194,7 +194,7 @@ std::string FilmGuard::placeFor(const std::string& path, std::uint64_t samples) 
 void FilmGuard::written(const std::string& path) {
     const auto found = places_.find(path);
     if (found == places_.end()) return;
-    found->second.samples = 0;  // What lies there now is of this run.
+    found->second.samples = 0;  // The existing file was written by this run.
     found->second.file = fileAt(path);
     if (found->second.beside.empty()) return;
     std::error_code gone;

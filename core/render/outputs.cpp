@@ -85,7 +85,7 @@ Image developedImage(const Output& output, const Film& film, const FilmIdentity&
         if (!value.empty()) image.metadata.emplace_back(key, std::move(value));
     };
     add("Software", "crt " CRT_VERSION);
-    add("crt/version", identity.version);  // Of the samples; who made this file of them is the software.
+    add("crt/version", identity.version);  // Of the samples; Software is the writer of this file.
     add("crt/sceneHash", identity.scene_hash);
     add("crt/seed", std::to_string(record.seed));
     if (record.complete) add("crt/complete", *record.complete ? "1" : "0");

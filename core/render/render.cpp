@@ -33,7 +33,7 @@ Film openFilm(std::optional<EarlierFilm> there, const CompiledScene& compiled, F
 /// A plugin may leave out what is only for humans.
 std::string textOrEmpty(const char* text) { return text != nullptr ? text : ""; }
 
-/// The driver behind a device, which only the list of devices tells.
+/// The driver of a device, which only the list of devices contains.
 std::string driverOf(const std::vector<CrtDevice>& devices, const std::string& device_name) {
     for (const CrtDevice& device : devices)
         if (arrayText(device.name) == device_name) return arrayText(device.driver);
@@ -50,7 +50,8 @@ void askForReport(Session& session, RunFacts& facts) {
     facts.devices = session.group().shares();
 }
 
-/// Who renders, and when. A film that was complete before this run is written without any backend.
+/// User, host and date of the render. A film that was complete before this run is written without any
+/// backend.
 void describeRun(FilmIdentity& identity, const RunFacts& facts) {
     if (facts.backend_name.empty()) return;
     FilmRecord run;
@@ -73,14 +74,14 @@ void openDevices(Session& session, RunFacts& facts) {
     facts.backend_build = textOrEmpty(backend.table->build);
 }
 
-/// Whether the film has all the samples that were asked for. With nothing but a time to go by, the end of
-/// the time is the end of the work.
+/// True if the film has all requested samples. With nothing but a time to go by, the end of the time is the
+/// end of the work.
 bool isComplete(const RunFacts& facts) {
     return facts.stop == StopReason::Samples || facts.stop == StopReason::Target ||
            (facts.stop == StopReason::Time && facts.target_samples == 0);
 }
 
-/// What the film says of itself, but for its error.
+/// Facts about the film, except its error.
 void judge(const Film& film, const Scene& scene, RunFacts& facts) {
     facts.samples = film.samples;
     facts.invalid_samples = film.invalidSamples();
@@ -148,7 +149,7 @@ void SceneOnDevices::open(RunFacts& facts) {
     session_->beginOpeningDevice();
 }
 
-/// What it takes to see the scene: one flat blob, and the mask of what it needs. Nothing is built for a
+/// The data that rendering needs: one flat blob, and the mask of its features. Nothing is built for a
 /// backend that brings it, nor where none will render.
 void SceneOnDevices::compile() {
     if (compiled_) return;

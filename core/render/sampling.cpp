@@ -31,7 +31,7 @@ constexpr double kReadBytesPerSecond = 2e9; // First guess of what reading costs
 /// Thrown through a chunk that is not waited for any more.
 struct ChunkGivenUp {};
 
-/// How many samples the next chunk should have.
+/// Number of samples of the next chunk.
 class ChunkSizer {
 public:
     explicit ChunkSizer(std::uint64_t fixed) : fixed_(fixed) {}
@@ -234,7 +234,7 @@ SamplingResult sampleFilm(DeviceFilm& devices, Film& film, const SamplingPlan& p
         return reachesTarget(film, plan.target_error, plan.paths);
     };
 
-    // Why to stop before the samples are there, and even within a chunk; nothing while there is no reason.
+    // Reason to stop before all samples are taken, even within a chunk; nothing if there is none.
     const auto reasonToHurry = [&]() -> std::optional<StopReason> {
         if (const std::optional<StopRequest> request = watch.stopRequested()) {
             result.request = *request;

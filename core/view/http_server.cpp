@@ -132,7 +132,7 @@ struct HttpServer::Listening {
     tcp::acceptor acceptor{context};
 };
 
-/// A stream with a context of its own: its thread waits for it, and for how long is known.
+/// A stream with a separate context: its thread waits for it, with a known limit.
 class HttpServer::Connection {
 public:
     tcp::socket& socket() { return stream_.socket(); }

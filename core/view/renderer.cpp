@@ -98,7 +98,7 @@ void Renderer::run() {
     }
 }
 
-/// Whatever went wrong, the next wish begins anew.
+/// After any error the next request starts from the beginning.
 void Renderer::recover(const std::string& what) {
     failed_ = taken_;
     applied_.reset();

@@ -29,7 +29,8 @@ std::unique_ptr<TevSender> tevOf(const ViewOptions& options, Board& board) {
     return std::make_unique<TevSender>(*options.tev, name, board);
 }
 
-/// What each film holds: which surface a pixel shows, and how far it is where a lens can be focused on it.
+/// AOVs that each film holds: the surface that a pixel shows, and its distance if a lens can be focused on
+/// it.
 std::uint32_t basicAovs(const Scene& scene) {
     return kAovPrimitive | (scene.camera.aperture_radius > 0 ? kAovDepth : 0u);
 }
@@ -145,8 +146,8 @@ void Viewer::changeOnce(const ViewChange& change) {
 
 namespace {
 
-/// Throws for a camera so much nearer to its target, or farther from it, than the scene's own that its
-/// directions would be rounding.
+/// Throws for a camera so close to its target, or so far from it, compared with the scene's own camera, that
+/// its directions would be rounding errors.
 void requireReach(const CameraPose& pose, const Camera& camera) {
     constexpr double kMost = 1e9;
     const double own = length(camera.target - camera.position), now = length(pose.target - pose.position),

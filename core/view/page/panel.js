@@ -1,4 +1,4 @@
-// What stands beside the picture.
+// The panel next to the image.
 const planes = planeKeys;
 for (const plane of planes) {
   const button = element("button", plane, { type: "button" });

@@ -5,8 +5,8 @@ const canvas = by("canvas");
 const paper = canvas.getContext("2d");
 const view = {
   status: null,      // As the program last said it.
-  picture: null,     // What of it is on the canvas.
-  frames: 0,         // Pictures drawn: for whoever measures.
+  picture: null,     // The part of the state that is on the canvas.
+  frames: 0,         // Number of images drawn, for measurements.
   version: 0,
   connected: false,
 };
