@@ -435,7 +435,7 @@ TEST_CASE("the record of a merged film is that of the first samples, with every 
     wrong.record->window = {0, 0, 2, 1};
     writeCheckpoint(directory / "wrong.crtfilm", Film({1, 1, 4, kAovSquares}), wrong);
     CHECK_THROWS_WITH(readCheckpoint(directory / "wrong.crtfilm"),
-                      Contains("record of its scene that is of a film of another size"));
+                      Contains("record of its scene that belongs to a film of another size"));
 }
 
 TEST_CASE("a checkpoint of another scene is refused with both hashes", "[checkpoint]") {

@@ -489,8 +489,9 @@ TEST_CASE("what is said of an image's own error agrees with its interval", "[con
     CHECK_THAT(said(0.928, 0.90, 0.96).text, Contains("0.928 (0.900–0.960)"));
     CHECK_THAT(said(0.8, 0.7, 0.9).text, Contains("understates its own error:"));
     CHECK(said(0.8, 0.7, 0.9).tone == Tone::Warning);
-    CHECK_THAT(said(1.2, 0.7, 2.1).text, Contains("shows no fault, but is not known within a tenth"));
-    CHECK_THAT(said(1.2, 0, std::numeric_limits<double>::infinity()).text, Contains("cannot be told"));
+    CHECK_THAT(said(1.2, 0.7, 2.1).text, Contains("shows no fault, but is known to no better than a tenth"));
+    CHECK_THAT(said(1.2, 0, std::numeric_limits<double>::infinity()).text, Contains("It is unknown "
+                                                                                    "whether"));
 }
 
 TEST_CASE("a configuration without a valid row has a line, a verdict and no numbers", "[converge]") {

@@ -121,9 +121,9 @@ TEST_CASE("a text that is no record is refused, whatever of it is missing or wro
     // The message says of what is no number what it is, not all of it.
     const std::string seed = "\"seed\":18446744073709551615", long_text(100000, 'x');
     CHECK_THROWS_WITH(readRecord(with(seed, "\"seed\":\"" + long_text + '"')),
-                      "has string for a whole number from 0 to 18446744073709551615");
+                      "has string where a whole number from 0 to 18446744073709551615 is expected");
     CHECK_THROWS_WITH(readRecord(with(seed, "\"seed\":-1")),
-                      "has -1 for a whole number from 0 to 18446744073709551615");
+                      "has -1 where a whole number from 0 to 18446744073709551615 is expected");
     CHECK_THROWS_AS(readRecord(with("\"color_space\":\"srgb\"", "\"color_space\":\"cmyk\"")), Error);
     CHECK_THROWS_AS(readRecord(with("\"window\":[8,4,40,36]", "\"window\":[8,4,80,36]")), Error);
     CHECK_THROWS_AS(readRecord(with("\"window\":[8,4,40,36]", "\"window\":[8,4,8,36]")), Error);

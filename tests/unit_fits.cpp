@@ -307,7 +307,7 @@ TEST_CASE("verdicts", "[fits]") {
     SECTION("without a reference nothing can be said") {
         run.references.clear();
         CHECK(verdict() == Verdict::Inconclusive);
-        CHECK(reason() == "There is no reference, so a bias cannot be seen.");
+        CHECK(reason() == "There is no reference, so a bias is invisible.");
     }
     SECTION("one invalid sample voids the row, and the configuration fails") {
         run.rows.back().invalid_samples = 1;

@@ -70,8 +70,8 @@ TEST_CASE("an IES file is what it says, with its factors and all round", "[ies]"
 }
 
 TEST_CASE("an IES file that is wrong is refused at its line", "[ies]") {
-    refused("", 0, "no line 'TILT='");
-    refused("a\nb\n", 2, "no line 'TILT='");
+    refused("", 0, "the line 'TILT=' is missing");
+    refused("a\nb\n", 2, "the line 'TILT=' is missing");
     refused(with("TILT=NONE", "TILT=lamp.tlt"), 3, "TILT=lamp.tlt is not read");
     refused(with("1 1000 2 3 2 1", "1 1000 2 3 2 3"), 4, "photometry of type A");
     refused(with("1 1000 2 3 2 1", "1 1000 2 3 2 2"), 4, "photometry of type B");
@@ -93,7 +93,7 @@ TEST_CASE("an IES file that is wrong is refused at its line", "[ies]") {
     refused(with("4 5 6", "4 nan 6"), 9, "a number, found 'nan'");
     refused(with("4 5 6", "4 1e999 6"), 9, "a number, found '1e999'");
     refused(with("4 5 6", "4 5"), 9, "the file ends where a candela value should stand");
-    refused(with("4 5 6", "4 5 6 7"), 9, "more behind the last candela value");
+    refused(with("4 5 6", "4 5 6 7"), 9, "continues after the last candela value");
     // Ten thousand by ten thousand, as a bomb of a few bytes.
     refused(kHead + "TILT=NONE\n1 1 1 10000 10000 1 1 0 0 0 1 1 1\n0\n", 4, "too short");
 }
@@ -162,7 +162,7 @@ TEST_CASE("IES lamps and beams of a scene, and what is wrong with them where it 
     wrong(ies + ", direction: [0, 0, 0]", "length 0");
     wrong(ies + ", scale: 1, power_w: 1", "scale");
     wrong(ies + ", scale: -1", "must be 0 or more");
-    wrong(ies + ", spectrum: 0", "no light that candelas measure");
+    wrong(ies + ", spectrum: 0", "no visible light, which candelas measure");
     const std::string beam = "type: beam, position: [0, 1, 0], irradiance: 1";
     wrong(beam + ", direction: [0, -1, 0]", "radius or size");
     wrong(beam + ", direction: [0, -1, 0], radius: 1, size: [1, 1]", "radius");

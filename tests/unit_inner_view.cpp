@@ -167,7 +167,7 @@ TEST_CASE("a house as OBJ and as glTF is seen by a camera within it, with a lamp
         const CapturedLog log;
         GltfFiles files;
         const std::string text = importModel(files, path).scene;
-        CHECK_THAT(log.text(), Contains("a camera within it, which sees more of its materials") &&
+        CHECK_THAT(log.text(), Contains("a camera inside it, where it sees more of the materials") &&
                                    Contains("a grey sky and a lamp at the camera"));
         CHECK_THAT(text, Contains("name: camera, type: point") && !Contains("type: sun"));
         return text;

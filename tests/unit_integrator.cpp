@@ -135,7 +135,7 @@ TEST_CASE("readFilm adds", "[integrator]") {
 
     CHECK(kindOfFailure([&] { second.readFilm(film); }, "overlap") == ErrorKind::Usage);
     Film other = filmOf(makeScene(4, 5));
-    CHECK(kindOfFailure([&] { first.readFilm(other); }, "another shape") == ErrorKind::Internal);
+    CHECK(kindOfFailure([&] { first.readFilm(other); }, "differs from the scene's") == ErrorKind::Internal);
 }
 
 TEST_CASE("a cancelled render leaves nothing that could be read", "[integrator]") {
@@ -229,7 +229,7 @@ TEST_CASE("a film that no sound backend hands over is refused, and what was ther
     Film film = filmOf(scene);
     for (const auto& [fault, words] :
          {std::pair{"nan_film", "broke the contract: pixel 2,1 of its film is not a number"},
-          {"count_film", "pixel 0,0 of its film has 15 samples and 14 were asked for"}}) {
+          {"count_film", "pixel 0,0 of its film has 15 samples instead of 14"}}) {
         const ScopedFault scoped(fault);
         CHECK(kindOfFailure([&] { integrator.readFilm(film); }, words) == ErrorKind::Internal);
         CHECK(film.samples.count() == 0);
@@ -259,7 +259,7 @@ TEST_CASE("a scene without a BVH is for backends that bring one", "[integrator]"
     CHECK(compileOptionsFor(openFake("fake")).accelerator_reach == 0);
     Integrator fake(openFake("fake"), {});
     CHECK(kindOfFailure([&] { fake.setScene(without); },
-                        "backend 'fake' needs the BVH that was left out of this scene") ==
+                        "backend 'fake' needs the BVH, and this scene was compiled without it") ==
           ErrorKind::Internal);
     fake.setScene(makeScene(4, 3));
     CHECK(compileOptionsFor(openFake("many_devices")).accelerator_reach == 2);

@@ -81,6 +81,6 @@ TEST_CASE("files that are read as one scene have one unit", "[unit][refused]") {
     CHECK(unitOf("include: none.yaml\nunit: mm\n") == 0.001);
     for (const char* text : {"include: mm.yaml\nunit: m\n", "include: [mm.yaml, cm.yaml]\n"}) {
         const std::string said = refused(text, {}, folder.path());
-        CHECK_THAT(said, Contains("mm.yaml:2:7") && Contains("count in one unit"));
+        CHECK_THAT(said, Contains("mm.yaml:2:7") && Contains("must use the same unit"));
     }
 }

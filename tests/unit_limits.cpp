@@ -64,7 +64,7 @@ TEST_CASE("only regular files are read, and a pipe is not waited for", "[limits]
         CHECK_THROWS_WITH(readImage(file), Contains(what));
         CHECK_THROWS_WITH(readCheckpoint(file), Contains(what));
     }
-    CHECK_THROWS_WITH(loadScene(pipe), Contains("for standard input write '-'"));
+    CHECK_THROWS_WITH(loadScene(pipe), Contains("write '-' for standard input"));
     const std::string mesh =
         folder.write("mesh.obj", "mtllib pipe\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n");
     // Ends: who waited for a writer of the pipe would wait for ever.
@@ -98,12 +98,12 @@ TEST_CASE("no output replaces an input or another output", "[limits][output]") {
         return refusal([&] { refuseOverInputs({scene, mesh}, outputs, films); });
     };
     CHECK(refused({folder / "a.exr", folder / "a.png"}, {folder / "a.crtfilm"}).empty());
-    CHECK_THAT(refused({scene}), Contains("would replace a file that is read"));
-    CHECK_THAT(refused({folder.path() + "/./scene.yaml"}), Contains("they are one file"));
-    CHECK_THAT(refused({}, {folder / "hard.obj"}), Contains("they are one file"));
-    CHECK_THAT(refused({folder / "soft.obj"}), Contains("they are one file"));
+    CHECK_THAT(refused({scene}), Contains("would replace an input file"));
+    CHECK_THAT(refused({folder.path() + "/./scene.yaml"}), Contains("they are the same file"));
+    CHECK_THAT(refused({}, {folder / "hard.obj"}), Contains("they are the same file"));
+    CHECK_THAT(refused({folder / "soft.obj"}), Contains("they are the same file"));
     CHECK_THAT(refused({folder / "a.exr", folder / "a.exr"}), Contains("two outputs have the same name"));
-    CHECK_THAT(refused({folder / "a.exr"}, {folder.path() + "//a.exr"}), Contains("are one file"));
+    CHECK_THAT(refused({folder / "a.exr"}, {folder.path() + "//a.exr"}), Contains("are the same file"));
     CHECK(refused({}, {folder / "a.crtfilm", folder / "a.crtfilm"}).empty());
 }
 
@@ -290,8 +290,9 @@ TEST_CASE("light beyond what floats carry is refused with its place", "[limits][
     CHECK_THAT(lit("1e308"), Contains("it must be 0 to 1e+25"));
     CHECK_THAT(lit("{blackbody: 5000, scale: 1e30}"),
                Contains("reaches") && Contains("it must be 0 to 1e+25"));
-    CHECK_THAT(lit("1e-50"), Contains("scene.yaml:4:5: error: 'lamp' is the brightest light, of radiance "
-                                      "1e-50, and single precision carries light from 1e-25"));
+    CHECK_THAT(lit("1e-50"), Contains("scene.yaml:4:5: error: the brightest light is 'lamp', with a "
+                                      "radiance of 1e-50, and the smallest value in single precision is "
+                                      "1e-25"));
     CHECK(lit("1e-50", "environment: {radiance: 1}\n").empty());
 
     const TemporaryFolder folder;
@@ -300,5 +301,5 @@ TEST_CASE("light beyond what floats carry is refused with its place", "[limits][
     CHECK_THAT(
         refusal([&] { parseScene("crt: 1\nobjects:\n  - {obj: lamp.obj}\n", "scene.yaml", folder.path()); }),
         Contains("scene.yaml:3:5: error: the radiance of a material (Ke)") &&
-            Contains("single precision carries light up to 1e+25"));
+            Contains("the largest value in single precision is 1e+25"));
 }

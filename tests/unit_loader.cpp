@@ -132,7 +132,7 @@ TEST_CASE("a plugin that renders other bits is refused by both versions and both
 TEST_CASE("what a backend brings is read from tables that have it, and must reach the scene", "[loader]") {
     const ScopedVariable path("CRT_BACKEND_PATH", CRT_FAKE_PLUGIN_DIR);
     CHECK_THAT(refusal("short_reach"),
-               Contains("it brings an acceleration structure that reaches 0.5, and scenes reach 1"));
+               Contains("its acceleration structure reaches 0.5, and scenes reach 1"));
     CHECK(acceleratorReach(loadBackend("many_devices")) == 2);
     CHECK(acceleratorReach(loadBackend("version_1_1")) == 0);  // its table ends before
     CHECK(acceleratorReach(loadBackend("fake")) == 0);

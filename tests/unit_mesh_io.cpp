@@ -106,7 +106,7 @@ TEST_CASE("normals without direction, or that are not there, shade their faces f
         const char *normal, *named, *said;
     };
     for (const Case& c :
-         {Case{"0 0 0", "1", "mesh.obj: 1 face shaded flat: a normal of theirs has no direction"},
+         {Case{"0 0 0", "1", "mesh.obj: 1 face shaded flat: one of their normals has no direction"},
           {"nan 0 1", "1",
            "mesh.obj:5: the numbers of a vertex normal must be finite, found 'nan'; 1 face shaded flat"},
           {"inf 0 0", "1", "found 'inf'; 1 face shaded flat"},
@@ -114,7 +114,7 @@ TEST_CASE("normals without direction, or that are not there, shade their faces f
            "mesh.obj:5: expected a number, found '-1.#IND00'; 1 face shaded flat"},
           {"0 1", "1", "mesh.obj:5: a vertex normal needs three numbers; 1 face shaded flat"},
           {"1 0 0", "9",
-           "mesh.obj:7: 1 face shaded flat: a normal of theirs is not in the file, which has 2"},
+           "mesh.obj:7: 1 face shaded flat: they use a normal that is not in the file, which has 2"},
           {"1 0 0", "-9", "mesh.obj:7: 1 face shaded flat"},
           {"1 0 0", "0", "mesh.obj:7: 1 face shaded flat"},
           {"1 0 0", "x", "mesh.obj:7: 1 face shaded flat"}}) {
@@ -165,7 +165,7 @@ TEST_CASE("another format is named as what it is", "[mesh_io]") {
     std::string stl(84 + 50, '\0');
     stl[80] = 1;
     for (const auto& [content, words] : std::vector<std::pair<std::string, std::string>>{
-             {"ply\nformat ascii 1.0\n", "this is a PLY file; name it by 'ply:' in place of 'obj:'"},
+             {"ply\nformat ascii 1.0\n", "this is a PLY file; use 'ply:' instead of 'obj:'"},
              {"glTF\x02\0\0\0"s, "this is a binary glTF file (.glb); crt reads OBJ"},
              {"{\n  \"asset\": {\"version\": \"2.0\"}}", "this is a glTF file"},
              {"\x89PNG\r\n\x1a\n", "this is a PNG image"},

@@ -69,7 +69,7 @@ TEST_CASE("missing light: what settings leave out", "[missing-light]") {
     CHECK(crt::missingLight(sceneOf(kSun, kDiffuse, "{nee: false}")).empty());
     const std::string glass = "{type: dielectric, ior: 1.5}";
     CHECK(crt::missingLight(sceneOf(kSun, glass, "{max_depth: 2}")) ==
-          Strings{"what surfaces behind a body of glass reflect, for which 'max_depth: 2' is too small"});
+          Strings{"reflections by surfaces behind a glass body, for which 'max_depth: 2' is too small"});
     CHECK(crt::missingLight(sceneOf(kSun, glass, "{max_depth: 3}")).empty());
     // Panes are passed without scattering; and a depth of 0 is no mistake.
     CHECK(crt::missingLight(sceneOf(kSun, "{type: thin_dielectric, ior: 1.5}", "{max_depth: 1}")).empty());

@@ -126,7 +126,7 @@ TEST_CASE("names of material files are forgiven backslashes, case, folders and q
     const CapturedLog log;
     CHECK(
         isDefined(loadObj(folder.write("mesh.obj", "mtllib old.mtl\n" + kSquare + "usemtl a\nf 1 2 3\n"))));
-    CHECK_THAT(log.text(), Contains("there is no material file 'old.mtl'; read '"));
+    CHECK_THAT(log.text(), Contains("the material file 'old.mtl' does not exist; crt read '"));
     CHECK(log.warnings() == 1);
 }
 
@@ -141,8 +141,8 @@ TEST_CASE("a missing material file, or name, costs materials, not the mesh", "[m
     CHECK(m.mesh.material == std::vector<std::int32_t>{0, 0, 1, 0});
     CHECK(m.missing_files == std::vector<std::string>{"missing.mtl"});
     CHECK(log.warnings() == 1);
-    CHECK_THAT(log.text(), Contains("materials 'red', '(null)' are not defined, and no file 'missing.mtl' "
-                                    "is there: 4 of 4 triangles have none of their own"));
+    CHECK_THAT(log.text(), Contains("materials 'red', '(null)' are not defined, and the file 'missing.mtl' "
+                                    "does not exist: 4 of 4 triangles have no material"));
 
     // A file that cannot be read is one that is missing.
     folder.write("locked.mtl", "newmtl red\nKd 1 1 1\n");
@@ -211,7 +211,7 @@ TEST_CASE("materials of families of exporters are what they were", "[mesh_io][mt
     // Maya, with a texture
     const Material textured = loadMaterial("illum 4\nKd 0 0 0\nmap_Kd a.jpg\nTf 1 1 1\n").material;
     CHECK(textured.reflectance[200] == Approx(0.6).epsilon(1e-3));
-    CHECK_THAT(log.text(), Contains("a black Kd beside map_Kd read as grey 0.6 (1)"));
+    CHECK_THAT(log.text(), Contains("a black Kd together with map_Kd read as grey 0.6 (1)"));
     // A Sponza in circulation
     CHECK(typeOf("Ns 7.843137\nKa 0 0 0\nKd 0.4704 0.4704 0.4704\nKs 0 0 0\nNi 1.000000\nd 0.000000\nillum "
                  "2\nmap_Kd KAMEN.JPG\n") == MaterialType::Diffuse);
@@ -288,7 +288,7 @@ TEST_CASE("d between 0 and 1 without Ni is opacity, and so is map_d", "[mesh_io]
     CHECK_THAT(lost.text(), Contains("the alpha of the map_Kd read for the map_d, which is the same image"));
     CHECK_FALSE(load("map_d gone.png\nnorm away.png\n").map_d);
     CHECK_THAT(lost.text(),
-               Contains("dropped: map_d (1), norm (1); there is no image 'away.png' and 1 more"));
+               Contains("dropped: map_d (1), norm (1); the image 'away.png' does not exist and 1 more"));
     const MtlMaterial glass = load("Ni 1.5\nillum 6\nmap_d mask.png\nnorm mask.png\n");
     CHECK(glass.material.type == MaterialType::Dielectric);
     CHECK_FALSE((glass.map_d || glass.norm));
@@ -353,8 +353,8 @@ TEST_CASE("one line says what the materials of a file became and lost", "[mesh_i
                Contains("mesh.obj: 27 materials: 23 diffuse, 1 mirror, 3 glass, 1 of them emitting; d 0 "
                         "without Ni above 1 read as opaque (22), d between 0 and 1 with Ni above 1 read as "
                         "clear glass (3), Pm from 0.5 to 1 read as 1 (1); "
-                        "dropped: Ks (22), Ns (22), map_Kd (22), Tf (3), Pc (1), Pr (1); "
-                        "there is no image 'wall.png'\n"));
+                        "dropped: Ks (22), Ns (22), map_Kd (22), Tf (3), Pc (1), Pr (1); the image "
+                        "'wall.png'\n does not exist"));
 }
 
 TEST_CASE("every documented keyword of an MTL is known and every other is said to be unknown",

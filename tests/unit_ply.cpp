@@ -240,7 +240,7 @@ TEST_CASE("faces of a PLY may have texture coordinates of their own, as MeshLab 
     CHECK(mesh.uv_index == Triangles{{0, 1, 2}, {0, 2, 3}, {kNoUv, kNoUv, kNoUv}, {4, 5, 6}});
     CHECK(mesh.uvs[2] == std::array<double, 2>{.5, 1});
     CHECK(mesh.uvs[6] == std::array<double, 2>{.5, .6});
-    CHECK_THAT(log.text(), Contains("the texture 'skin.png', which a comment names"));
+    CHECK_THAT(log.text(), Contains("the texture 'skin.png', which a comment mentions"));
 }
 
 TEST_CASE("polygons of a PLY are divided as those of an OBJ", "[ply]") {
@@ -266,7 +266,7 @@ TEST_CASE("what is wrong in a PLY costs what it concerns, and is said", "[ply]")
     const std::string normals = "property float nx\nproperty float ny\nproperty float nz\n";
     for (const Case& c : {
              Case{"", kIndices, "0 0 0\n1 0 0\n0 1 0\nnan 1 0\n3 0 1 2\n3 0 1 3\n", 1,
-                  "mesh.ply:13: the position of vertex 3 is no finite number; 1 face left out for such "
+                  "mesh.ply:13: the position of vertex 3 is not finite; 1 face left out for such "
                   "vertices"},
              {"", kIndices, "0 0 0\n1 0 0\n0 1 0\n1,5 1 0\n3 0 1 2\n3 0 1 3\n", 1, "position of vertex 3"},
              {"", kIndices, "0 0 0\n1 0 0\n0 1 0\n1 1 0\n3 0 1 2\n2 0 1\n", 1,
@@ -276,10 +276,10 @@ TEST_CASE("what is wrong in a PLY costs what it concerns, and is said", "[ply]")
              {"", kIndices, "0 0 0\n1 0 0\n0 1 0\n2 0 0\n3 0 1 2\n3 0 1 3\n", 1,
               "mesh.ply: 1 triangle without area left out"},
              {normals, kIndices, "0 0 0 0 0 1\n1 0 0 0 0 2\n0 1 0 0 0 1\n1 1 0 0 0 0\n3 0 1 2\n3 1 3 2\n", 2,
-              "mesh.ply: 1 face shaded flat: a normal of theirs has no direction"},
+              "mesh.ply: 1 face shaded flat: one of their normals has no direction"},
              {normals, kIndices, "0 0 0 0 0 1\n1 0 0 0 0 2\n0 1 0 0 0 1\n1 1 0 0 inf 0\n3 0 1 2\n3 1 3 2\n",
               2,
-              "mesh.ply:16: the normal of vertex 3 is no finite number; 1 face shaded flat for such "
+              "mesh.ply:16: the normal of vertex 3 is not finite; 1 face shaded flat for such "
               "normals"},
              {"property float u\nproperty float v\n", kIndices,
               "0 0 0 0 0\n1 0 0 1 nan\n0 1 0 0 1\n1 1 0 1e9 0\n3 0 1 2\n3 1 3 2\n", 2,
@@ -294,7 +294,7 @@ TEST_CASE("what is wrong in a PLY costs what it concerns, and is said", "[ply]")
               "0 0 0 255 1\n1 0 0 254 1\n0 1 0 255 1\n1 1 0 255 1\n3 0 1 2\n3 1 3 2\n", 2,
               "left out: 'confidence' of vertices; 'alpha' of vertices"},
              {"", kIndices, "0 0 0\n1 0 0\n0 1 0\n1 1 0\n3 0 1 2\n3 1 3 2\n3 0 1 3\n", 2,
-              "left out: 8 bytes behind the last element"},
+              "left out: 8 bytes after the last element"},
          }) {
         CAPTURE(c.rows);
         PlyWriter ply("ascii", headerWith(c.vertex, 4, c.face, 2));
@@ -320,22 +320,22 @@ TEST_CASE("bad PLYs are refused with their place", "[ply]") {
     };
     // Headers
     checkRefused("ply\nformat ascii 1.0\nelement vertex 3\n", 4, "the header of this PLY does not end");
-    checkRefused("ply\nend_header\n", 2, "does not say its format");
+    checkRefused("ply\nend_header\n", 2, "lacks the format");
     checkRefused(with(kHeader, "ascii", "binary"), 2,
                  "is ascii, binary_little_endian or binary_big_endian, not 'binary'");
     checkRefused(with(kHeader, "1.0", "2.0"), 2, "crt reads version 1.0 of PLY, not '2.0'");
     checkRefused(with(kHeader, "element vertex 3", "element vertex -3"), 3,
-                 "an element has a name and a number");
+                 "an element needs a name and a number");
     checkRefused(with(kHeader, "element vertex 3", "element vertex"), 3,
-                 "an element has a name and a number");
-    checkRefused(with(kHeader, "element face", "element vertex"), 7, "the element 'vertex' is there twice");
-    checkRefused(with(kHeader, "float y", "float x"), 5, "the property 'x' of 'vertex' is there twice");
-    checkRefused(with(kHeader, "float y", "real y"), 5, "'real' is no type of PLY");
-    checkRefused(with(kHeader, "float y", "float"), 5, "a property has a type and a name");
+                 "an element needs a name and a number");
+    checkRefused(with(kHeader, "element face", "element vertex"), 7, "the element 'vertex' occurs twice");
+    checkRefused(with(kHeader, "float y", "float x"), 5, "the property 'x' of 'vertex' occurs twice");
+    checkRefused(with(kHeader, "float y", "real y"), 5, "'real' is not a PLY type");
+    checkRefused(with(kHeader, "float y", "float"), 5, "a property needs a type and a name");
     checkRefused(with(kHeader, "list uchar", "list float"), 8, "the length of a list is an integer");
-    checkRefused(with(kHeader, "element vertex 3\n", ""), 3, "a property stands before the first element");
+    checkRefused(with(kHeader, "element vertex 3\n", ""), 3, "a property precedes the first element");
     checkRefused(with(kHeader, "property float y", "colour float y"), 5,
-                 "'colour' is no statement of a PLY header");
+                 "'colour' is not a statement of a PLY header");
     checkRefused(with(kHeader, "float y", "float w"), 3, "vertices need the numbers x, y and z");
     checkRefused(with(kHeader, "vertex_indices", "indices"), 7,
                  "faces need a list 'vertex_indices' or 'vertex_index'");
@@ -354,7 +354,7 @@ TEST_CASE("bad PLYs are refused with their place", "[ply]") {
     checkRefused(kHeader + kVertices, 7,
                  "the header says 1 of 'face', 2 bytes each or more, and 0 bytes follow");
     checkRefused(with(kHeader, "face 1", "face 3") + kVertices + face, 13,
-                 "face 1 of 3, counted from 0, is not there: the file ends before it");
+                 "face 1 of 3, counted from 0, is missing: the file ends before it");
     // Rows
     checkRefused(kHeader + "0 0 0\n1 0\n0 1 0\n" + face, 11,
                  "vertex 1 of 3, counted from 0, has too few values on its line");
@@ -362,10 +362,10 @@ TEST_CASE("bad PLYs are refused with their place", "[ply]") {
     checkRefused(kHeader + kVertices + "-3 0 1 2\n", 13, "has a list of -3 values");
     checkRefused(kHeader + kVertices + "4000000000 0 1 2\n", 13,
                  "has a list of 4000000000 values, and fewer");
-    checkRefused(kHeader + kVertices + "3 0 1 x\n", 13, "has 'x' where a whole number belongs");
-    checkRefused(kHeader + kVertices + "3 0 1 1.5\n", 13, "has '1.5' where a whole number belongs");
-    checkRefused(kHeader + kVertices + "3 0 1 3\n", 13, "names vertex 3, but the file has 3");
-    checkRefused(kHeader + kVertices + "3 0 -1 2\n", 13, "names vertex -1, but the file has 3");
+    checkRefused(kHeader + kVertices + "3 0 1 x\n", 13, "has 'x' where a whole number is expected");
+    checkRefused(kHeader + kVertices + "3 0 1 1.5\n", 13, "has '1.5' where a whole number is expected");
+    checkRefused(kHeader + kVertices + "3 0 1 3\n", 13, "uses vertex 3, but the file has 3");
+    checkRefused(kHeader + kVertices + "3 0 -1 2\n", 13, "uses vertex -1, but the file has 3");
     CHECK(loadText(kHeader + kVertices + "3.0 0 1.000 2\n").mesh.triangles == Triangles{{0, 1, 2}});
     // A file of faces without area is sound; who shows it decides what that means.
     for (const char* only : {"3 0 1 1\n", "3 0 0 1\n"}) {
@@ -377,13 +377,13 @@ TEST_CASE("bad PLYs are refused with their place", "[ply]") {
     checkRefused(kHeader + kVertices + "2 0 1\n", 13,
                  "a face needs at least three corners, and face 0 has 2");
     checkRefused(kHeader + "nan 0 0\n1 0 0\n0 1 0\n" + face, 10,
-                 "the position of vertex 0 is no finite number");
+                 "the position of vertex 0 is not finite");
     checkRefused(with(kHeader, "face 1", "face 0") + kVertices, 0, "this mesh has no faces, only 3 points");
     // Other files
     checkRefused("v 0 0 0\n", 0,
-                 "this is no PLY file, which begins with the line 'ply'; an OBJ is named by 'obj:'");
-    checkRefused("\x89PNG\r\n", 0, "this is a PNG image; 'ply:' names a PLY");
-    checkRefused("", 0, "this is no PLY file");
+                 "this is not a PLY file, because its first line is not 'ply'; for an OBJ use 'obj:'");
+    checkRefused("\x89PNG\r\n", 0, "this is a PNG image; 'ply:' needs a PLY file");
+    checkRefused("", 0, "this is not a PLY file");
 }
 
 TEST_CASE("a binary PLY that ends early, anywhere, is refused", "[ply]") {
@@ -486,21 +486,21 @@ TEST_CASE("a PLY in a scene", "[ply][scene_yaml]") {
     CHECK_THAT(refused(grey + "objects: [{ply: plain.ply}]", {}, folder.path()),
                Contains("'material' is missing in object 0"));
     CHECK_THAT(refused(grey + "objects: [{ply: plain.ply, material: from_mtl}]", {}, folder.path()),
-               Contains("only an OBJ has materials of its own"));
+               Contains("only an OBJ has its own materials"));
     for (const char* key : {"override: true", "mtl: {color: srgb}", "parts: {a: {material: grey}}"})
         CHECK_THAT(refused(fmt::format("{}objects: [{{ply: plain.ply, material: grey, {}}}]", grey, key), {},
                            folder.path()),
                    Contains("only an OBJ has"));
     CHECK_THAT(refused(grey + "objects: [{obj: plain.ply, material: grey}]", {}, folder.path()),
-               Contains("this is a PLY file; name it by 'ply:' in place of 'obj:'"));
+               Contains("this is a PLY file; use 'ply:' instead of 'obj:'"));
     CHECK_THAT(refused(grey + "objects: [{ply: plian.ply, material: grey}]", {}, folder.path()),
                Contains("cannot find 'plian.ply'") && Contains("did you mean 'plain.ply'?"));
     CHECK_THAT(refused("materials: {c: {type: diffuse, reflectance: {attribute: colors}}}\nobjects: [{ply: "
                        "plain.ply, material: c}]",
                        {}, folder.path()),
-               Contains("material 'c' asks for colours of vertices, but the mesh of object 0 has none"));
+               Contains("material 'c' needs colours of vertices, but the mesh of object 0 has none"));
     folder.write("plain.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
     CHECK_THAT(refused(grey + "objects: [{obj: plain.obj, material: grey, vertex_colors: srgb}]", {},
                        folder.path()),
-               Contains("this is about the colours in a PLY"));
+               Contains("this key needs colours from a PLY"));
 }

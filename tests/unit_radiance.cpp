@@ -172,7 +172,7 @@ TEST_CASE("the exposure of a Radiance picture is not divided out, and said once"
     const CapturedLog log;
     CHECK(readImage(path).pixels[0] == 1);
     CHECK(log.warnings() == 1);
-    CHECK_THAT(log.text(), Contains("a.hdr") && Contains("EXPOSURE=0.5") && Contains("divide by it"));
+    CHECK_THAT(log.text(), Contains("a.hdr") && Contains("EXPOSURE=0.5") && Contains("divide them by it"));
     spit(path, "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\nEXPOSURE=2\nEXPOSURE=0.5\n" + pixels);
     CHECK(readImage(path).pixels[0] == 1);
     CHECK(log.warnings() == 1);
@@ -201,7 +201,7 @@ TEST_CASE("a Radiance picture that is damaged says why", "[texels][radiance]") {
     refused(kRgbe + "-Y 1 +X 2\n" + textOf({1, 1, 1, 1}) + pixel, "a row begins with a run");
     refused(kRgbe + "-Y 1 +X 2\n" + pixel + textOf({1, 1, 1, 2}), "a run goes beyond its row");
     const std::string runs = kRgbe + "-Y 1 +X 8\n";
-    refused(runs + std::string("\x02\x02\x00\x09", 4) + std::string(40, '\1'), "another length");
+    refused(runs + std::string("\x02\x02\x00\x09", 4) + std::string(40, '\1'), "a length that differs");
     refused(runs + std::string("\x02\x02\x00\x08\x89", 5) + std::string(40, '\1'), "a run goes beyond");
     refused(runs + std::string("\x02\x02\x00\x08\x00", 5) + std::string(40, '\1'), "a run goes beyond");
 }

@@ -141,9 +141,9 @@ TEST_CASE("materials of an OBJ can be kept, replaced or ignored", "[scene_yaml][
                  "'Lmap.001'") &&
             Contains("did you mean 'Lamp.001'?") && Contains("its faces have 'body', 'Lamp.001'"));
     CHECK_THAT(refused("objects: [{obj: two.obj, override: true}]", {}, folder.path()),
-               Contains("name a material with 'material:'"));
+               Contains("name one with 'material:'"));
     CHECK_THAT(refused("objects: [{obj: two.obj, material: from_mtl, override: true}]", {}, folder.path()),
-               Contains("name a material with 'material:'"));
+               Contains("name one with 'material:'"));
     for (const char* key : {"override: true", "mtl: {color: srgb}", "parts: {a: {material: grey}}"})
         CHECK_THAT(
             refused(fmt::format("{}objects: [{{mesh: {}, material: grey, {}}}]\n", kGrey, kTriangle, key)),
@@ -257,15 +257,15 @@ TEST_CASE("the material of an object fills the faces of an OBJ that have none", 
         refused(kGrey + "objects: [{obj: some.obj, parts: {(null): {material: grey}}}]", {}, folder.path()),
         Contains("1 of 3 triangles of object 0 have no material"));
     CHECK_THAT(saidOf(kGrey + "objects: [{obj: some.obj, material: grey}]", folder.path()),
-               !Contains("has no face for material"));
+               !Contains("has no face without a material"));
 
     folder.write("all.obj", "mtllib some.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl body\nf 3 2 1\n");
     CHECK(parse(kGrey + "objects: [{obj: all.obj, material: grey}]", {}, folder.path())
               .meshes.at(0)
               .material == std::vector<std::int32_t>{1});
     CHECK_THAT(saidOf(kGrey + "objects: [{obj: all.obj, material: grey}]", folder.path()),
-               Contains("scene.yaml:3:36: object 0 has no face for material 'grey': the OBJ gives each its "
-                        "own; 'override: true' replaces them all"));
+               Contains("scene.yaml:3:36: object 0 has no face without a material, so 'grey' is unused; "
+                        "'override: true' replaces all materials of the OBJ"));
 }
 
 TEST_CASE("an OBJ whose MTL is missing needs a material, and says which file is missing",
@@ -273,8 +273,8 @@ TEST_CASE("an OBJ whose MTL is missing needs a material, and says which file is 
     const TemporaryFolder folder;
     folder.write("lost.obj", "mtllib lost.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl body\nf 3 2 1\n");
     CHECK_THAT(refused(kGrey + "objects: [{obj: lost.obj}]", {}, folder.path()),
-               Contains("1 of 1 triangles of object 0 have no material (the OBJ names 'lost.mtl', which is "
-                        "not there); give them one with 'material: NAME'"));
+               Contains("1 of 1 triangles of object 0 have no material (the OBJ refers to 'lost.mtl', which "
+                        "does not exist); give them one with 'material: NAME'"));
     CHECK(parse(kGrey + "objects: [{obj: lost.obj, material: grey}]", {}, folder.path())
               .meshes.at(0)
               .material == std::vector<std::int32_t>{-1});

@@ -26,14 +26,14 @@ TEST_CASE("files that are not there or not text", "[scene_yaml][refused]") {
     CHECK_THROWS_WITH(loadScene(folder.write("latin.yaml", "crt: 1\ntitle: caf\xe9\n")),
                       Contains("latin.yaml:2:11: error: byte 0xe9") && Contains("title: caf\ufffd\n"));
     CHECK_THROWS_WITH(loadScene(folder.write("a.xml", "<scene/>")),
-                      Contains("a.xml: error: this is a scene of Mitsuba; crt's Python package makes"));
+                      Contains("a.xml: error: this is a scene of Mitsuba; crt's Python package converts"));
     CHECK_THROWS_WITH(loadScene(folder.write("a.pbrt.gz", "\x1f\x8b")), Contains("a scene of pbrt; crt's"));
 }
 
 TEST_CASE("texts that are not YAML, or not the YAML of a scene", "[scene_yaml][refused]") {
     CHECK_THAT(refused("film: {resolution: [1, 2}\n"), Contains("scene.yaml:2:25: error: not valid YAML"));
     CHECK_THAT(refused("camera:\n\tfov: 3\n"),
-               Contains("scene.yaml:3:5: error: not valid YAML") && Contains("indent with blanks"));
+               Contains("scene.yaml:3:5: error: not valid YAML") && Contains("indent with spaces"));
     CHECK_THAT(refused("title: *nowhere\n"),
                Contains("scene.yaml:2:8: error: not valid YAML: the referenced anchor is not defined"));
     CHECK_THAT(refusal("- 1\n- 2\n").what(),
@@ -42,13 +42,13 @@ TEST_CASE("texts that are not YAML, or not the YAML of a scene", "[scene_yaml][r
     CHECK_THAT(refused("---\ncrt: 1\n"),
                Contains("scene.yaml:2:1: error: a second YAML document begins here"));
     CHECK_THAT(refused("title: !!str x\n"),
-               Contains("error: the YAML tag 'tag:yaml.org,2002:str' means nothing in a scene"));
+               Contains("error: a scene has no YAML tags; remove 'tag:yaml.org,2002:str'"));
     CHECK_THAT(refused("? [1, 2]\n: 3\n"),
                Contains("scene.yaml:2:3: error: a list as a key is not possible here"));
     CHECK_THAT(refused("title: " + std::string(3000, '[') + "\n"),
                Contains("nested more than 64 levels deep"));
     CHECK_THAT(refused("objects: &a [{name: x, transforms: *a}]\n"),
-               Contains("scene.yaml:2:36: error: this alias is inside the value it stands for"));
+               Contains("scene.yaml:2:36: error: this alias is inside its own value"));
     CHECK_THAT(refused("film: {<<: {resolution: [1, 1]}}\n"),
                Contains("scene.yaml:2:8: error: merge keys ('<<') are not part of a scene"));
 
@@ -121,7 +121,7 @@ TEST_CASE("long lines are cut around the place", "[scene_yaml][refused]") {
     for (int i = 0; i < 200; ++i) table += std::to_string(360 + i) + ", ";
     const std::string message = refused(table + "nan], value: [1]}}}\n");
     CHECK_THAT(message,
-               Contains("value 201 of 'nm', found 'nan': NaN and infinity have no place in a scene"));
+               Contains("value 201 of 'nm', found 'nan': a scene cannot contain NaN or infinity"));
     CHECK_THAT(message, Contains(" | …") && Contains("^~~"));
     CHECK(message.size() < 500);
 }
@@ -213,7 +213,7 @@ TEST_CASE("spectra that cannot be", "[scene_yaml][refused]") {
     CHECK_THAT(refusedReflectance("{table: {nm: [400, 550, 700], value: [0.1, 1.25, 0.5]}, outside: clamp}"),
                Contains("'reflectance' of material 'm' reaches 1.25 at 550 nm; it must be 0 to 1"));
     CHECK_THAT(refusedReflectance("-0.1"), Contains("is -0.1; it must be 0 to 1"));
-    CHECK_THAT(refusedReflectance(".nan"), Contains("NaN and infinity have no place in a scene"));
+    CHECK_THAT(refusedReflectance(".nan"), Contains("a scene cannot contain NaN or infinity"));
     CHECK_THAT(refusedReflectance("{rgb: [1.2, 0, 0]}"),
                Contains("a component of this colour is 1.2; a reflectance must be 0 to 1"));
     CHECK_THAT(refusedReflectance("{rgb: [0.2, 0, 0], spcae: srgb}"), Contains("did you mean 'space'?"));
@@ -245,7 +245,7 @@ TEST_CASE("spectra that cannot be", "[scene_yaml][refused]") {
                Contains("'blackbody' is 0; it must be 100 to"));
     CHECK_THAT(refused("spectra: {a: b, b: {ref: a}}\nenvironment: {radiance: a}\n"),
                Contains("spectrum 'a' is defined by itself"));
-    CHECK_THAT(refused("spectra: {0.5: 1}\n"), Contains("'0.5' cannot name a spectrum"));
+    CHECK_THAT(refused("spectra: {0.5: 1}\n"), Contains("'0.5' cannot be the name of a spectrum"));
     CHECK_THAT(refused("spectra: {withe: 1, other: whte}\n"),
                Contains("there is no spectrum 'whte'") && Contains("did you mean 'withe'?"));
     CHECK_THAT(refused("materials: {m: {type: dielectric, ior: {rgb: [1, 1, 1]}}}\n"),
@@ -274,7 +274,7 @@ TEST_CASE("spectra that cannot be", "[scene_yaml][refused]") {
     CHECK_THAT(refusedMaterial("{type: rough_dielectric, ior: 1.5, roughness: 0.5, "
                                "thin_film: {thickness_nm: 300, ior: 1.3, "
                                "relative_thickness: {checker: [0, 1]}}}"),
-               Contains("equally thick everywhere") && Contains("take a dielectric"));
+               Contains("a uniform thickness") && Contains("use a dielectric"));
     CHECK_THAT(refused("materials: {m: {type: dielectric, ior: 1.5, thin_film: {thickness_nm: 300, "
                        "ior: 1.3, relative_thickness: {checker: [0, 1]}}}}\n"
                        "objects: [{mesh: {positions: [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "
@@ -284,35 +284,35 @@ TEST_CASE("spectra that cannot be", "[scene_yaml][refused]") {
                Contains("unknown key 'anisotropy'"));
     CHECK_THAT(refusedMaterial("{type: rough_conductor, metal: Al, roughness: {checker: [0, 1]}, "
                                "roughness_anisotropy: 0.5}"),
-               Contains("equally rough everywhere") && Contains("give 'roughness' a number"));
+               Contains("a uniform roughness") && Contains("give 'roughness' a number"));
     CHECK_THAT(refusedMaterial("{type: rough_dielectric, ior: 1.5, roughness: 0.5, "
                                "roughness_anisotropy: 0.5, thin_film: {thickness_nm: 300, ior: 1.3}}"),
-               Contains("as rough in every direction") && Contains("leave 'thin_film'"));
+               Contains("must be isotropic") && Contains("leave 'thin_film'"));
     const auto refusedOpenPbr = [&](const std::string& keys) {
         return refusedMaterial("{type: openpbr, " + keys + "}");
     };
     for (const auto& [keys, why, instead] :
-         {std::tuple{"subsurface_weight: 1", "wanders below a surface", "leave 'subsurface_weight' out"},
+         {std::tuple{"subsurface_weight: 1", "subsurface scattering", "remove 'subsurface_weight'"},
           std::tuple{"coat_weight: 0.5, transmission_weight: 0.5", "coats lie on what is opaque",
                      "leave 'coat_weight'"},
           std::tuple{"coat_weight: {checker: [0, 1]}, coat_ior: 0.9", "an index of 1 to 10", "from 1 to 10"},
           std::tuple{"coat_weight: 1, coat_ior: 11", "an index of 1 to 10", "from 1 to 10"},
           std::tuple{"coat_weight: 1, coat_roughness: 0.5, coat_roughness_anisotropy: 0.5",
-                     "as rough in every direction", "leave 'coat_roughness_anisotropy'"},
+                     "must be isotropic", "leave 'coat_roughness_anisotropy'"},
           std::tuple{"coat_weight: 1, coat_roughness: 0.5, base_metalness: 1, "
                      "specular_roughness: {checker: [0, 1]}",
-                     "worked out for one roughness", "'coat_roughness' 0"},
+                     "needs a uniform roughness", "'coat_roughness' 0"},
           std::tuple{"coat_weight: 1, emission_luminance: 1", "the coat would take",
                      "leave 'coat_weight'"},
-          std::tuple{"coat_weight: 1, specular_ior: 17", "an index of 1 to 10", "from 1 on"},
-          std::tuple{"fuzz_weight: 1, emission_luminance: 1", "take some of the light",
+          std::tuple{"coat_weight: 1, specular_ior: 17", "an index of 1 to 10", "of at least 1"},
+          std::tuple{"fuzz_weight: 1, emission_luminance: 1", "absorb some of the emitted light",
                      "leave 'fuzz_weight'"},
-          std::tuple{"geometry_thin_walled: true", "no thin walls", "take a thin_dielectric"},
-          std::tuple{"base_metalness: 1, specular_weight: 2", "more light than there is", "1 or less"},
-          std::tuple{"specular_color: 0.5", "no dielectric tints", "'base_metalness' 1"},
-          std::tuple{"specular_roughness_anisotropy: 0.5", "as rough in every direction", "leave it out"},
-          std::tuple{"specular_roughness: {checker: [0, 1]}", "equally rough everywhere", "a number"},
-          std::tuple{"specular_ior: 0.9", "an index of 1 to 10", "from 1 on"},
+          std::tuple{"geometry_thin_walled: true", "does not support thin-walled", "use a thin_dielectric"},
+          std::tuple{"base_metalness: 1, specular_weight: 2", "more light than it receives", "1 or less"},
+          std::tuple{"specular_color: 0.5", "'specular_color' for metals only", "'base_metalness' 1"},
+          std::tuple{"specular_roughness_anisotropy: 0.5", "must be isotropic", "leave it out"},
+          std::tuple{"specular_roughness: {checker: [0, 1]}", "a uniform roughness", "a number"},
+          std::tuple{"specular_ior: 0.9", "an index of 1 to 10", "of at least 1"},
           std::tuple{"transmission_weight: 1, transmission_color: 0.5", "tint the surface itself",
                      "give 'transmission_depth'"},
           std::tuple{"transmission_weight: 1, transmission_color: 0, transmission_depth: 1", "opaque",
@@ -320,7 +320,7 @@ TEST_CASE("spectra that cannot be", "[scene_yaml][refused]") {
           std::tuple{"thin_film_weight: 1", "films on clear dielectrics", "'transmission_weight' 1"},
           std::tuple{"base_metalness: 1, specular_roughness: {checker: [0, 1]}, "
                      "specular_roughness_anisotropy: 1",
-                     "equally rough everywhere", "a number"},
+                     "a uniform roughness", "a number"},
           std::tuple{"transmission_weight: 1, transmission_color: 0.5, transmission_depth: 1, "
                      "geometry_opacity: 0.5",
                      "closed", "leave 'geometry_opacity'"}}) {
@@ -339,7 +339,7 @@ TEST_CASE("spectra that cannot be", "[scene_yaml][refused]") {
     CHECK_NOTHROW(parse("materials: {m: {type: openpbr, coat_weight: 1, coat_ior: 1.5, "
                        "specular_roughness: {checker: [0, 1]}}}\n"));
     CHECK_THAT(refusedOpenPbr("coat_weight: 0.5, coat_ior: 1.5, specular_roughness: {checker: [0, 1]}"),
-               Contains("equally rough everywhere"));
+               Contains("a uniform roughness"));
     const std::string lamp = "materials: {m: {type: openpbr, emission_luminance: 1}, "
                              "t: {type: two_sided, front: m, back: m}}\n";
     CHECK_THAT(refused(lamp), Contains("material 'm' emits light") && Contains("give the object"));
@@ -380,9 +380,9 @@ TEST_CASE("objects that cannot be", "[scene_yaml][refused]") {
     CHECK_THAT(refused("objects: [{mesh: " + kTriangle + "}]\n"),
                Contains("scene.yaml:2:11: error: 'material' is missing in object 0"));
     CHECK_THAT(refused("objects: [{mesh: " + kTriangle + ", material: from_mtl}]\n"),
-               Contains("only an OBJ has materials of its own"));
+               Contains("only an OBJ has its own materials"));
     CHECK_THAT(refused(meshScene("mesh: {positions: [[0, 0, 0]], faces: [[0, 0, 1]]}")),
-               Contains("face 0 names position 1, but there are only 1"));
+               Contains("face 0 uses position 1, but there are only 1"));
     CHECK_THAT(refused(meshScene("mesh: {positions: [[0, 0, 0]], faces: [[0, 0, -1]]}")),
                Contains("an index of face 0 is -1; it must be 0 to"));
     CHECK_THAT(refused(meshScene("mesh: {positions: [[0, 0, 0]], faces: [[0, 0]]}")),
@@ -413,7 +413,7 @@ TEST_CASE("objects that cannot be", "[scene_yaml][refused]") {
     CHECK_THAT(refused(meshScene("mesh: " + kTriangle + ", transform: [{scale: 1e200}, {scale: 1e200}]")),
                Contains("overflows"));
     CHECK_THAT(refused(meshScene("mesh: " + kTriangle + ", transforms: []")),
-               Contains("an object with no placement is nowhere"));
+               Contains("an object without placements is invisible"));
     CHECK_THAT(refused(meshScene("mesh: " + kTriangle + ", emission: {radiance: -2}")),
                Contains("'radiance' of the emission of object 0 is -2; it must be 0 to 1e+25"));
     CHECK_THAT(refused(meshScene("mesh: " + kTriangle + ", emission: {radiance: .nan}")), Contains("NaN"));
@@ -425,7 +425,7 @@ TEST_CASE("outputs that cannot be", "[scene_yaml][refused]") {
         Contains(
             "scene.yaml:2:18: error: 'a.jpg' does not end in one of .exr, .png, .ppm, .pfm; add 'format'"));
     CHECK_THAT(refused("outputs: [{file: a.png, aovs: [depth]}]\n"),
-               Contains("only exr files hold more than the image"));
+               Contains("only exr files can hold AOVs"));
     CHECK_THAT(refused("outputs: [{file: a.exr, aovs: [dpeth]}]\n"), Contains("did you mean 'depth'?"));
     CHECK_THAT(refused("outputs: [{file: a.exr}, {file: a.exr}]\n"), Contains("'a.exr' is written twice"));
     CHECK_THAT(refused("outputs: [{format: exr}]\n"), Contains("'file' is missing in output 0"));

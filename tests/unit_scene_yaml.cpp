@@ -293,7 +293,7 @@ TEST_CASE("spectrum files are found beside the scene", "[scene_yaml]") {
           constantSpectrum(1));
 
     CHECK_THAT(refused("environment: {radiance: {file: lamp.spd}}", {}, folder.path()),
-               Contains("scene.yaml:2:32: error") && Contains("say 'outside: clamp' or 'outside: zero'"));
+               Contains("scene.yaml:2:32: error") && Contains("add 'outside: clamp' or 'outside: zero'"));
     folder.write("broken.spd", "400 1\n500 x\n");
     CHECK_THAT(refused("environment: {radiance: {file: broken.spd, outside: zero}}", {}, folder.path()),
                Contains("scene.yaml:2:32: error") && Contains("broken.spd:2"));
@@ -380,7 +380,7 @@ TEST_CASE("errors in overrides name the argument", "[scene_yaml][override][refus
     CHECK_THAT(refusedOverride(body, "film.resolution=[0,"),
                Contains("--set film.resolution: error: not valid YAML"));
     CHECK_THAT(refusedOverride(body, "film.resolution="),
-               Contains("--set film.resolution: error: there is no value after '='"));
+               Contains("--set film.resolution: error: the value after '=' is missing"));
     CHECK_THAT(refusedOverride(body, "materials.rde.reflectance=1"),
                Contains("there is no 'rde' in 'materials'") && Contains("did you mean 'red'?"));
     CHECK_THAT(refusedOverride(body, "objects.1.material=red"),

@@ -207,9 +207,9 @@ TEST_CASE("images that cannot be values say why", "[texels]") {
     CHECK_THAT(refusalOf(path), Contains(path) && Contains("cannot be opened"));
     CHECK_THAT(refusalOf(folder.path()), Contains("directory"));
     spit(path, "");
-    CHECK_THAT(refusalOf(path), Contains("it is no PNG, JPEG"));
+    CHECK_THAT(refusalOf(path), Contains("it is not a PNG, JPEG"));
     spit(path, "GIF89a");
-    CHECK_THAT(refusalOf(path), Contains("it is no PNG, JPEG"));
+    CHECK_THAT(refusalOf(path), Contains("it is not a PNG, JPEG"));
 
     writeImage(path, OutputFormat::Png, imageOf(linearCodes()));
     const std::string png = slurp(path);
@@ -298,7 +298,7 @@ TEST_CASE("what a file says of its pixels and crt does not apply is told", "[tex
         marked.insert(2, std::string("\xff\xe1\0", 3) + static_cast<char>(data.size() + 2) + data);
         spit(jpeg, marked);
         CHECK_THAT(toldOf(jpeg, false),
-                   Contains("a.jpg") && Contains("EXIF orientation 6") && Contains("turn the pixels"));
+                   Contains("a.jpg") && Contains("EXIF orientation 6") && Contains("rotate the pixels"));
         // Truncated anywhere, it is ignored.
         for (std::size_t size = 0; size < exif.size() - 4; ++size) {
             spit(png, pngOf(kind, stream, pngChunk("eXIf", exif.substr(0, size))));

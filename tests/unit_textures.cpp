@@ -486,7 +486,7 @@ TEST_CASE("what is wrong about textures is told with its place", "[texture]") {
 
     crt::spit(in + "/text.png", "hello");
     CHECK_THAT(refusal(squareWith("{texture: text.png}"), in),
-               Contains("test.yaml:2:") && Contains("it is no PNG, JPEG"));
+               Contains("test.yaml:2:") && Contains("it is not a PNG, JPEG"));
     std::ifstream file(in + "/a.png", std::ios::binary);
     std::string bytes{std::istreambuf_iterator<char>(file), {}};
     const std::size_t pixels = bytes.find("IDAT") + 8;
@@ -500,7 +500,7 @@ TEST_CASE("what is wrong about textures is told with its place", "[texture]") {
     write(in + "/bright.exr", crt::OutputFormat::Exr, {2, 1, {{0, 0, 0}, {7, 0.5, 0}}});
     const Probe probe(squareWith("{texture: bright.exr, filter: nearest}"), in);
     CHECK(distance(probe.color(0.75, 0.5), {1, 0.5, 0}) < 2e-3);
-    CHECK_THAT(log.text(), Contains("1 numbers outside [0, 1]"));
+    CHECK_THAT(log.text(), Contains("1 values outside [0, 1]"));
 }
 
 TEST_CASE("a texture of an EXR with alpha has the colours before they were multiplied", "[texture]") {
@@ -542,13 +542,13 @@ TEST_CASE("opacities of vertices, linear in between or by a threshold", "[textur
     const std::string& in = folder.path();
     CHECK_THAT(refusal(with("", ""), in), Contains("opacity of vertices") && Contains("vertex_opacity"));
     CHECK_THAT(refusal(squareWith("{attribute: opacity}"), in),
-               Contains("opacities of vertices are numbers"));
-    CHECK_THAT(refusal(squareWith("{attribute: colors, cutoff: 0.5}", ""), in), Contains("about opacities"));
+               Contains("cannot use opacities of vertices"));
+    CHECK_THAT(refusal(squareWith("{attribute: colors, cutoff: 0.5}", ""), in), Contains("for opacities"));
     write(in + "/a.png", crt::OutputFormat::Png, noise(4, 4, 3));
     CHECK_THAT(refusal("crt: 1\nmaterials: {it: {type: diffuse, reflectance: {texture: a.png}}}\nobjects: "
                        "[{gltf: {file: a.glb, mesh: 0, vertex_opacity: true}, material: it}]\n",
                        in),
-               Contains("opacities in place of texture coordinates"));
+               Contains("opacities instead of texture coordinates"));
 }
 
 TEST_CASE("what an image says and crt ignores is told once for all textures of it", "[texture]") {
@@ -578,7 +578,8 @@ TEST_CASE("an OBJ brings texture coordinates, its MTL images", "[texture][obj]")
     const std::string yaml = "crt: 1\nobjects: [{obj: a.obj}]\nenvironment: {radiance: 1}\n";
     const CapturedLog log;
     const Scene scene = sceneOf(yaml, in);
-    CHECK_THAT(log.text(), Contains("map_Kd (1)") && Contains("a.mtl:9") && Contains("it is no PNG, JPEG"));
+    CHECK_THAT(log.text(), Contains("map_Kd (1)") && Contains("a.mtl:9") && Contains("it is not a PNG, "
+                                                                                     "JPEG"));
     REQUIRE(scene.textures.size() == 1);
     const crt::Mesh& mesh = scene.meshes[0];
     REQUIRE(mesh.uvs.size() == 4);
@@ -614,7 +615,7 @@ TEST_CASE("an OBJ brings texture coordinates, its MTL images", "[texture][obj]")
     CHECK(cut.textures.at(static_cast<std::size_t>(leaf.normal_texture)).image->kind ==
           crt::TexelKind::Normals);
     CHECK((fence.opacity == .5 && fence.opacity_texture == crt::kNoTexture));
-    CHECK_THAT(log.text(), Contains("c.mtl:9") && Contains("the d beside it counts"));
+    CHECK_THAT(log.text(), Contains("c.mtl:9") && Contains("crt uses d instead"));
 
     // A material of the scene's, on an OBJ with texture coordinates and on one without.
     const std::string own =

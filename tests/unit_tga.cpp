@@ -113,9 +113,9 @@ TEST_CASE("texels of a TGA: runs, grey, 16 bits and colour maps", "[texels][tga]
           std::vector<std::uint8_t>{3, 2, 1, 0x13, 0x12, 0x11, 3, 2, 1, 0x13, 0x12, 0x11, 3, 2, 1, 0x13,
                                     0x12, 0x11});
     CHECK_THAT(Read(tga(1, 8, kFromTheTop, "\x05\x06\x07\x05\x06\x05", map, 5, 24)).refusal(),
-               Contains("a.tga") && Contains("its map does not have"));
+               Contains("a.tga") && Contains("is not in the colour map"));
     CHECK_THAT(Read(tga(1, 8, kFromTheTop, "\x05\x06\x04\x05\x06\x05", map, 5, 24)).refusal(),
-               Contains("its map does not have"));
+               Contains("is not in the colour map"));
 }
 
 TEST_CASE("alpha of a TGA: where its header and its extension say that it is", "[texels][tga]") {
@@ -127,7 +127,7 @@ TEST_CASE("alpha of a TGA: where its header and its extension say that it is", "
     CHECK(Read(tga(2, 32, kFromTheTop, data)).color().bytes == kCodes);
     CHECK(Read(withMeaning(file, 3)).alpha().info.channels == 1);
     CHECK(Read(withMeaning(file, 1)).alpha().info.channels == 0);
-    CHECK_THAT(Read(withMeaning(file, 4)).refusal(), Contains("multiplied by its alpha"));
+    CHECK_THAT(Read(withMeaning(file, 4)).refusal(), Contains("premultiplied by alpha"));
 }
 
 TEST_CASE("a TGA that is damaged says why", "[texels][tga]") {
@@ -148,5 +148,5 @@ TEST_CASE("a TGA that is damaged says why", "[texels][tga]") {
     CHECK_THAT(Read(large).refusal(), Contains("65535 x 65535") && Contains("256 million"));
     // Kinds and depths that do not go together are no TGA.
     for (const auto& [kind, depth] : {std::pair{1u, 8u}, {2u, 8u}, {3u, 24u}, {4u, 24u}, {10u, 17u}})
-        CHECK_THAT(Read(tga(kind, depth, 0, data)).refusal(), Contains("it is no PNG, JPEG, TGA"));
+        CHECK_THAT(Read(tga(kind, depth, 0, data)).refusal(), Contains("it is not a PNG, JPEG, TGA"));
 }

@@ -197,10 +197,11 @@ TEST_CASE("an OBJ says the same in blocks of any size", "[threads]") {
             REQUIRE(contentsOf(text, block) == whole);
         }
     }
-    CHECK(contentsOf(texts[5], 1).starts_with("line 8: 'x' is not a corner"));
-    CHECK(contentsOf(texts[6], 1).starts_with("line 7: a face names vertex -9, but only 4 stand before it"));
+    CHECK(contentsOf(texts[5], 1).starts_with("line 8: 'x' is not a face corner"));
+    CHECK(contentsOf(texts[6], 1).starts_with("line 7: a face uses vertex -9, but only 4 vertices precede "
+                                              "it"));
     CHECK(
-        contentsOf(texts[7], 1).starts_with("line 7: a face names vertex 99999999999, but the file has 4"));
+        contentsOf(texts[7], 1).starts_with("line 7: a face uses vertex 99999999999, but the file has 4"));
 }
 
 TEST_CASE("work in parts covers everything once, and its exception arrives", "[threads]") {

@@ -240,8 +240,8 @@ TEST_CASE("an object says which normals its mesh has", "[vertex_normals][scene_y
         CHECK(distance(normalAt(meshOf(3), 1, 0), faceNormal(meshOf(3), 1)) < 1e-15);
     }
     CHECK_THAT(refused(grey + object(written, ", crease_angle_deg: 30")),
-               Contains("only normals that crt works out have creases") &&
-                   Contains("write 'normals: smooth' beside it"));
+               Contains("only computed normals have creases") &&
+                   Contains("add 'normals: smooth'"));
     CHECK_THAT(refused(grey + object(written, ", normals: round")), Contains("smooth"));
     CHECK_THAT(refused(grey + object(written, ", normals: smooth, crease_angle_deg: 181")),
                Contains("0 to 180"));

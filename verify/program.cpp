@@ -64,7 +64,7 @@ void readPart(const std::string& text, Arguments& to) {
     if (!has_slash || std::from_chars(slash + 1, end, to.parts).ptr != end || to.part < 1 ||
         to.part > to.parts)
         throw Error(ErrorKind::Usage,
-                    fmt::format("--part is I/N, from 1/N to N/N, such as 2/4; it is not '{}'", text));
+                    fmt::format("--part takes I/N, from 1/N to N/N, such as 2/4, not '{}'", text));
 }
 
 std::vector<const Case*> partOf(const std::vector<const Case*>& all, std::size_t part, std::size_t parts) {
@@ -78,7 +78,7 @@ void lookFirstIn(const std::string& directory) {
         throw Error(
             ErrorKind::Usage,
             fmt::format(
-                "--plugin-path '{}' is not a directory; it should be the one with crt_backend_<name>.so",
+                "--plugin-path '{}' is not a directory; name the one that holds crt_backend_<name>.so",
                 directory));
     const char* others = std::getenv("CRT_BACKEND_PATH");
     const std::string path =

@@ -243,7 +243,7 @@ def counts(models):
 
 def parts(warning):
     """What one warning lists, each by itself, without the name of the file."""
-    listed = warning.split(": not in the scene as in the file: ")
+    listed = warning.split(": ignored or approximated: ")
     return listed[1].split("; ") if len(listed) == 2 else [warning]
 
 

@@ -289,7 +289,7 @@ def no_area(f):
 
 
 def names_no_vertex(f):
-    return re.search(r"a face names vertex|is not a corner of a face", f.error) is not None
+    return re.search(r"a face uses vertex|is not a face corner", f.error) is not None
 
 
 def refusals(files, renders):

@@ -128,9 +128,9 @@ void Film::saveImage(const std::string& path, Watch* watch) const {
         if (!format)
             throw crt::Error(
                 crt::ErrorKind::Usage,
-                fmt::format("the name of the image '{}' ends in none of .exr, .png, .ppm and .pfm", path));
+                fmt::format("the name of the image '{}' does not end in .exr, .png, .ppm or .pfm", path));
         checkWritable(path);
-        // An EXR holds the AOVs that the scene asks for.
+        // An EXR holds the AOVs that the scene requests.
         const std::uint32_t aovs = *format == OutputFormat::Exr ? identity.record->aovs : 0;
         writeOutput({.file = path, .format = *format, .aovs = aovs, .place = {}}, film, identity);
     });

@@ -18,7 +18,7 @@ void Image::save(const std::string& path, Watch* watch) const {
         if (!format)
             throw crt::Error(
                 crt::ErrorKind::Usage,
-                fmt::format("the name of the image '{}' ends in none of .exr, .png, .ppm and .pfm", path));
+                fmt::format("the name of the image '{}' does not end in .exr, .png, .ppm or .pfm", path));
         checkWritable(path);
         writeImage(path, *format, impl_->image);
     });

@@ -81,7 +81,7 @@ EarlierFilm earlierOf(Film& film) {
     return {"the earlier film", std::move(sums), std::move(identity)};
 }
 
-/// Whether a render may go on where another one was.
+/// True if a render may continue an earlier one.
 bool sameDevices(const crt::RenderOptions& a, const crt::RenderOptions& b) {
     return a.backend == b.backend && a.integrator.device == b.integrator.device &&
            a.integrator.threads == b.integrator.threads && a.integrator.use_cache == b.integrator.use_cache;

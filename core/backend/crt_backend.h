@@ -53,7 +53,7 @@ enum {
 typedef int32_t CrtLogLevel;
 enum { CRT_LOG_DEBUG = 0, CRT_LOG_INFO = 1, CRT_LOG_WARNING = 2, CRT_LOG_ERROR = 3 };
 
-/* What the host offers. Lives at least as long as every integrator created with it. */
+/* Functions of the host. Lives at least as long as every integrator created with it. */
 typedef struct CrtHost {
     uint32_t struct_size;
     uint16_t abi_major, abi_minor;
@@ -81,7 +81,7 @@ typedef struct CrtDevice {
     double score; /* higher is preferred; a CPU is about its number of threads, a GPU a few thousand */
 } CrtDevice;
 
-/* Which kernel the backend should run. */
+/* The kernel that the backend should run. */
 typedef int32_t CrtKernelChoice;
 enum {
     CRT_KERNEL_LEAN = 0, /* the smallest that covers the scene's features (default) */
@@ -122,7 +122,7 @@ typedef struct CrtRenderRange {
  * crop window. sums: [height][width][channels][2], each pair an unevaluated sum hi + lo of doubles (so that
  * order does not show). counts: [height][width], valid samples; an invalid (NaN or infinite) sample is
  * dropped and not counted. primitives: [height][width], primitive id at the first sample rendered,
- * 0xffffffff for none; null unless the scene asks for it.
+ * 0xffffffff for none; null unless the scene requests it.
  */
 typedef struct CrtFilmView {
     uint32_t struct_size;
@@ -132,7 +132,7 @@ typedef struct CrtFilmView {
     uint32_t *primitives;
 } CrtFilmView;
 
-/* What the backend did. Times in seconds; zero where it does not apply. */
+/* Report of the backend's work. Times in seconds; zero where it does not apply. */
 typedef struct CrtBackendReport {
     uint32_t struct_size;
     uint32_t kernel_from_cache;  /* 1 when the kernel came from a disk cache */
@@ -169,7 +169,7 @@ typedef struct CrtIntegrator {
 } CrtIntegrator;
 
 /*
- * What a backend brings itself, so that the host does not make it: bits of CrtBackend::brings.
+ * Data structures that the backend builds itself instead of the host: bits of CrtBackend::brings.
  *
  * CRT_BRINGS_ACCELERATOR: it finds hits with an acceleration structure of its own wherever the scene says
  * CRT_ACCELERATOR_BVH, for every ray whose origin lies within accelerator_reach of 0 on each axis (lengths

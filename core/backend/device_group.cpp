@@ -17,7 +17,7 @@
 namespace crt {
 namespace {
 
-/// Of what a backend counts from zero on with every scene.
+/// Counters that a backend starts from zero with every scene.
 void addCounts(const CrtBackendReport& from, CrtBackendReport& to) {
     to.paths += from.paths;
     to.closest_rays += from.closest_rays;
@@ -52,8 +52,8 @@ std::uint64_t samplesOf(const std::vector<RenderRange>& ranges) {
     return samples;
 }
 
-/// `count` in whole parts, as `weights` are to one another. What rounding leaves goes to the largest
-/// remainders, of equal ones to the first.
+/// `count` in whole parts, as `weights` are to one another. The remainder after rounding goes to the largest
+/// fractions, and among equal ones to the first.
 std::vector<std::uint64_t> shareOut(std::uint64_t count, const std::vector<double>& weights) {
     double all = 0;
     for (const double weight : weights) all += weight;
@@ -102,9 +102,9 @@ struct DeviceGroup::Member {
     double samples_per_second = 0;  ///< Of the last range; 0: not measured.
     /// Its film as it was read last, with several devices only: what is in there outlives the device.
     std::optional<Film> read;
-    std::vector<RenderRange> unread;  ///< What its own film has besides.
+    std::vector<RenderRange> unread;  ///< The samples that only its own film has.
     bool lacks_room = false;  ///< Dropped for want of memory, and nothing else.
-    std::uint64_t pixel_samples = 0;  ///< What share.samples stands for: a window may be a part of the film.
+    std::uint64_t pixel_samples = 0;  ///< share.samples times pixels: a window may be smaller than the film.
     bool has_scene = false;           ///< And what it counts belongs to it.
     CrtBackendReport earlier{};  ///< Of other windows of this scene: what backends count from zero on again.
 
@@ -125,7 +125,7 @@ struct DeviceGroup::Member {
     }
 };
 
-/// What one device is to render.
+/// The work of one device.
 struct DeviceGroup::Assignment {
     Member* member;
     std::vector<RenderRange> ranges;
@@ -222,7 +222,8 @@ void DeviceGroup::inParallel(const std::vector<Member*>& members,
     if (working().empty()) throw Error(*last_failure_);
     for (std::size_t i = 0; i < members.size(); ++i)
         if (thrown[i])
-            logWarning("device {} '{}' is dropped, the others go on: {}", members[i]->share.selector,
+            logWarning("device {} '{}' is dropped; the other devices continue: {}",
+                       members[i]->share.selector,
                        members[i]->share.name, members[i]->share.failure);
 }
 
@@ -275,7 +276,8 @@ std::vector<DeviceGroup::Assignment> DeviceGroup::divide(std::vector<RenderRange
     const std::vector<Member*> there = working();
     std::vector<Assignment> work;
     std::vector<double> weights;
-    // Who was not measured yet is as much faster or slower than the others as the scores say.
+    // A device without a measurement is assumed to be as much faster or slower than the others as the scores
+    // suggest.
     double measured = 0, measured_score = 0;
     for (const Member* member : there) {
         if (member->samples_per_second <= 0) continue;
@@ -305,7 +307,7 @@ std::vector<DeviceGroup::Assignment> DeviceGroup::divide(std::vector<RenderRange
     return work;
 }
 
-/// What was only in the films of devices that have failed, to be rendered again.
+/// The samples that only the films of failed devices held, to be rendered again.
 std::vector<RenderRange> DeviceGroup::collectLost() {
     std::vector<RenderRange> lost;
     for (const auto& member : members_) {

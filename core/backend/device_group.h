@@ -13,13 +13,13 @@
 
 namespace crt {
 
-/// What one device of a group did.
+/// Result of one device of a group.
 struct DeviceShare {
     std::string selector;       ///< As --device names it, of several its index: equal GPUs have one name.
     std::string name;           ///< Empty until the device is open.
     std::uint64_t samples = 0;  ///< Per pixel, that it added to the film.
     double seconds = 0;         ///< In its render calls.
-    std::string failure;        ///< Why it was dropped; empty while it works.
+    std::string failure;        ///< Reason why it was dropped; empty while it works.
 };
 
 /// Which of `devices` a --device names: "all", indices as "0,2", or else one, as it stands, which the
@@ -28,7 +28,7 @@ std::vector<std::string> devicesNamed(const std::string& text, const std::vector
 
 /// The verbs of an Integrator for all devices together.
 ///
-/// Each device adds sample ranges to a film of its own, as many as its speed allows, and films merge
+/// Each device adds sample ranges to its own film, as many as its speed allows, and films merge
 /// exactly: which device rendered what never shows in the image. A device that fails is dropped, with a
 /// warning, and the others render again what only its own memory had. Errors of the kind Device are thrown
 /// when the last one has failed, all others at once. [owner thread]
@@ -49,8 +49,8 @@ public:
     void setWindow(const CompiledScene& scene);
     /// Divides a range among the devices. `progress` gets [0,1].
     void render(const RenderRange& range, const std::function<void(double)>& progress = {});
-    /// Adds what all films hold to `film`, as Integrator::readFilm does. Where there are several devices the
-    /// host keeps a copy of each one's film: what a device loses that fails later is not in it.
+    /// Adds what all films hold to `film`, as Integrator::readFilm does. With several devices the host keeps
+    /// a copy of each one's film, so that the samples of a device that fails later are not lost.
     void readFilm(Film& film);
 
     /// Of all devices together: counts are sums, times those of the slowest.

@@ -113,7 +113,7 @@ struct Integrator::Impl {
     Impl(const Impl&) = delete;
     Impl& operator=(const Impl&) = delete;
 
-    /// Not a call(): what a plugin says while it ends goes to whoever made the last one.
+    /// Not a call(): messages of a plugin while it ends go to the maker of the last call.
     void destroy() noexcept {
         if (!std::exchange(created, false) || table.destroy == nullptr) return;
         try {
@@ -174,8 +174,8 @@ struct Integrator::Impl {
         }
     }
 
-    /// Why the plugin was given no text of a kernel, if that happened: thrown where the verb failed, for it
-    /// is the reason, and logged where the plugin goes on without.
+    /// Reason why the plugin got no kernel text, if any: thrown if the verb failed, because it is the cause,
+    /// and logged if the plugin continues without the text.
     void tellKernelError(CrtStatus status) {
         std::exception_ptr error;
         {
@@ -218,11 +218,12 @@ struct Integrator::Impl {
             for (std::size_t i = 0; i < values; ++i) finite &= std::isfinite(sums[i]);
             if (finite && part.counts[pixel] <= asked) continue;
             const std::string what =
-                finite ? fmt::format("has {} samples and {} were asked for", part.counts[pixel], asked)
+                finite ? fmt::format("has {} samples instead of {}", part.counts[pixel], asked)
                        : "is not a number";
             throw Error(ErrorKind::Internal,
                         fmt::format("backend '{}' broke the contract: pixel {},{} of "
-                                    "its film {}; what was rendered before is kept",
+                                    "its film {}; the samples rendered before it are "
+                                    "kept",
                                     backend.name, pixel % shape.width, pixel / shape.width, what));
         }
     }
@@ -304,7 +305,8 @@ void Integrator::setScene(const CompiledScene& scene, const std::function<void(d
     if (scene.without_nodes && acceleratorReach(self.backend) == 0) {
         throw Error(
             ErrorKind::Internal,
-            fmt::format("backend '{}' needs the BVH that was left out of this scene", self.backend.name));
+            fmt::format("backend '{}' needs the BVH, and this scene was compiled without it",
+                        self.backend.name));
     }
     CrtSceneBlob blob{};
     blob.struct_size = sizeof(blob);
@@ -333,7 +335,7 @@ bool Integrator::render(const RenderRange& range, const std::function<bool(doubl
         throw Error(ErrorKind::Internal,
                     "render was called after a cancelled or failed one without setScene between");
     if (range.sample_count > std::numeric_limits<std::uint64_t>::max() - range.first_sample) {
-        throw Error(ErrorKind::Usage, fmt::format("{} samples from sample {} on exceed 64 bits",
+        throw Error(ErrorKind::Usage, fmt::format("{} samples from sample {} exceed 64 bits",
                                                   range.sample_count, range.first_sample));
     }
     if (range.sample_count == 0) return true;
@@ -368,7 +370,7 @@ void Integrator::readFilm(Film& film) {
     const FilmShape &shape = film.shape(), &own = self.shape;
     if (shape.width != own.width || shape.height != own.height || shape.channels != own.channels ||
         ((shape.aovs ^ own.aovs) & kAovPrimitive) != 0) {
-        throw Error(ErrorKind::Internal, "readFilm was given a film of another shape than the scene's");
+        throw Error(ErrorKind::Internal, "readFilm got a film whose shape differs from the scene's");
     }
 
     if (film.samples.count() > 0) {

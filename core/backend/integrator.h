@@ -22,7 +22,7 @@ struct IntegratorOptions {
     bool use_cache = true;
 };
 
-/// What a scene for this backend need not bring.
+/// The parts that a scene for this backend may lack.
 CompileOptions compileOptionsFor(const LoadedBackend& backend);
 
 /// The shape of a film of this scene.

@@ -141,8 +141,8 @@ const char* kernelSource(const std::string& name) {
     const auto [place, is_new] = texts->try_emplace({directory, name});
     if (!is_new) return place->second.c_str();
     try {
-        // The directory replaces the embedded texts as a whole: a kernel of two origins would puzzle whoever
-        // debugs it.
+        // The directory replaces the embedded texts as a whole: a kernel of two origins would be hard to
+        // debug.
         const TextOf text_of = [&](const std::string& header) {
             return directory.empty() ? embeddedText(header) : textIn(directory, header);
         };
@@ -156,7 +156,8 @@ const char* kernelSource(const std::string& name) {
                     throw Error(
                         ErrorKind::Backend,
                         fmt::format(
-                            "CRT_KERNEL_DIR ({}) holds another {} than this crt was built with: rebuild crt",
+                            "CRT_KERNEL_DIR ({}) holds a {} that differs from the one in this crt: rebuild "
+                            "crt",
                             directory, header));
                 }
             }

@@ -116,7 +116,7 @@ bool hasBrings(const CrtBackend& table) {
            offsetof(CrtBackend, accelerator_reach) + sizeof(CrtBackend::accelerator_reach);
 }
 
-/// Whether a driver for a GPU runs here: then a backend without a device is worth a message.
+/// True if a driver for a GPU runs here: then a backend without a device is worth a message.
 bool hasGpuDriver() {
     std::error_code unreadable;
     return fs::exists("/dev/nvidiactl", unreadable) || fs::exists("/dev/dxg", unreadable) ||
@@ -154,15 +154,15 @@ void checkTable(const std::string& name, const std::string& path, const CrtBacke
     if (bitsVersionOf(*table) != CRT_BITS_VERSION) {
         refuse(fmt::format(
             "backend '{}' ({}) renders bits version {} ({}), and this crt has bits version {} ({}): its "
-            "samples would be others; rebuild the plugin",
+            "samples would differ; rebuild the plugin",
             name, path, bitsVersionOf(*table), orUnknown(table->build), CRT_BITS_VERSION, kHostBuild));
     }
     // Not a number is no reach either.
     if (hasBrings(*table) && (table->brings & CRT_BRINGS_ACCELERATOR) != 0 &&
         !(table->accelerator_reach >= 1)) {
         refuse(
-            fmt::format("backend '{}' ({}) broke the contract: it brings an acceleration structure that "
-                        "reaches {}, and scenes reach 1",
+            fmt::format("backend '{}' ({}) broke the contract: its acceleration structure reaches {}, and "
+                        "scenes reach 1",
                         name, path, table->accelerator_reach));
     }
     if (table->name == nullptr || table->probe == nullptr || table->create == nullptr) {
@@ -173,8 +173,8 @@ void checkTable(const std::string& name, const std::string& path, const CrtBacke
     }
 }
 
-/// Whether a library has all the bytes that its segments take. dlopen maps them unasked, and the first touch
-/// of one behind the end of the file is a SIGBUS.
+/// True if a library has all the bytes of its segments. dlopen maps them unasked, and the first touch of one
+/// behind the end of the file is a SIGBUS.
 bool isCut(const std::string& file) {
     std::ifstream in(file, std::ios::binary);
     ElfW(Ehdr) header{};
@@ -223,7 +223,7 @@ std::string cacheDirectory() {
     }
     std::error_code failed;
     if (fs::create_directories(directory, failed)) {
-        // What is cached is run, so no other user may write there.
+        // Cached kernels are executed, so no other user may have write access there.
         fs::permissions(directory, fs::perms::owner_all, failed);
     }
     if (::access(directory.c_str(), R_OK | W_OK | X_OK) != 0 || !fs::is_directory(directory, failed)) {
@@ -233,13 +233,13 @@ std::string cacheDirectory() {
     struct stat status {};
     if (::stat(directory.c_str(), &status) != 0) return {};
     if (const std::string why = trust::whyNot(status, directory); !why.empty()) {
-        logWarning("no kernel cache, so kernels are compiled anew: {}", why);
+        logWarning("no kernel cache, so every process compiles its kernels: {}", why);
         return {};
     }
     return directory;
 }
 
-/// The text at an address that stays valid: a host table may be copied and outlive whoever made it.
+/// The text at an address that stays valid: a host table may be copied and outlive its maker.
 const char* keep(const std::string& text) {
     static std::mutex mutex;
     static auto* const texts = new std::set<std::string>;
@@ -296,7 +296,7 @@ LoadedBackend loadBackend(const std::string& name) {
     const std::string file = trustedFile(name, path);
     if (isCut(file))
         refuse(fmt::format("backend '{}' ({}) cannot be opened: the file is cut short", name, path));
-    // NOW: a missing symbol is told here and not in the middle of a render. LOCAL: the libraries of one
+    // NOW: a missing symbol is reported here and not in the middle of a render. LOCAL: the libraries of one
     // plugin are not those of another.
     void* library = ::dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL);
     if (library == nullptr) {

@@ -18,7 +18,7 @@ struct LoadedBackend {
     const CrtBackend* table = nullptr;
 };
 
-/// CrtBackend::accelerator_reach of a backend that brings an acceleration structure of its own, else 0.
+/// CrtBackend::accelerator_reach of a backend with its own acceleration structure, else 0.
 double acceleratorReach(const LoadedBackend& backend);
 
 /// Opens exactly crt_backend_<name>.so, or `name` itself when it holds a '/'. Throws crt::Error(Backend)
@@ -38,7 +38,7 @@ struct BackendStatus {
     std::string version;
     std::string build;
     std::vector<CrtDevice> devices;
-    std::string reason;  ///< Why it cannot run; empty when it can.
+    std::string reason;  ///< Reason why it cannot run; empty if it can.
     bool refused = false;  ///< It was not even opened: others could have written it (code_trust.h).
 };
 
@@ -57,8 +57,8 @@ struct PassedOver {
 /// those passed over.
 LoadedBackend chooseBackend(std::vector<PassedOver>& reasons);
 
-/// What --backend asks for: the one of that name, or for "auto" what chooseBackend picks, with a line in the
-/// log for each one passed over (only with -v for what is absent).
+/// The backend that --backend selects: the one of that name, or for "auto" what chooseBackend picks, with a
+/// line in the log for each one passed over (only with -v for what is absent).
 LoadedBackend openBackend(const std::string& name);
 
 /// Text of a fixed array that a plugin filled, not necessarily up to a terminator.

@@ -90,7 +90,7 @@ bool isStandardOutput(const std::string& path) { return path == "-" || path.rfin
 
 namespace {
 
-/// A name of its own in the folder of a file: the file's, which is cut where both would be too long.
+/// A unique name in the folder of a file: the file's name, cut if the result would be too long.
 std::string temporaryBeside(const std::string& file, int attempt) {
     constexpr std::size_t kLongestName = 255;
     const std::string end = fmt::format(".{}-{}.tmp", ::getpid(), attempt);
@@ -125,7 +125,7 @@ AtomicFile::AtomicFile(const std::string& path) : path_(path), final_(path) {
             refuse(path_, fmt::format("it is a link to '{}', whose directory does not exist", final_));
         // Such as /proc, where the kernel makes the files.
         if (error_number == ENOENT && fs::is_directory(directoryOf(final_), ignored))
-            refuse(path_, fmt::format("the folder '{}' takes no files", directoryOf(final_)));
+            refuse(path_, fmt::format("the folder '{}' does not allow new files", directoryOf(final_)));
         if (error_number == ENOENT)
             refuse(path_, fmt::format("the directory '{}' does not exist", directoryOf(final_)));
         fail("cannot write", error_number);
@@ -170,11 +170,11 @@ void AtomicFile::openStreamed() {
     const int error_number = errno;
     const std::string wanted = std::exchange(temporary_, {});
     throw Error(ErrorKind::Output,
-                fmt::format("cannot write '{}', which is to go to standard output: {}", wanted,
+                fmt::format("cannot write '{}', which is meant for standard output: {}", wanted,
                             std::strerror(error_number)));
 }
 
-/// What was written under the temporary name, by write() or by a library, to standard output.
+/// Copies the bytes under the temporary name, written by write() or by a library, to standard output.
 void AtomicFile::stream() {
     std::fflush(stdout);
     const int source = ::open(temporary_.c_str(), O_RDONLY | O_CLOEXEC);

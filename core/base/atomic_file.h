@@ -1,6 +1,6 @@
 /// Files that are either whole or not there: written under a temporary name in the same directory, synced,
-/// renamed. Whoever reads the final name, or looks at it after a crash, sees the old file or the new one,
-/// never half of either.
+/// renamed. A reader of the final name, even after a crash, sees the old file or the new one, never half of
+/// either.
 #pragma once
 
 #include <cstddef>
@@ -27,7 +27,7 @@ public:
 
     /// Appends `size` bytes.
     void write(const void* bytes, std::size_t size);
-    /// Where the bytes lie until commit(): for libraries that write to a name rather than through write().
+    /// Path of the bytes until commit(): for libraries that write to a name rather than through write().
     const std::string& temporaryPath() const { return temporary_; }
     /// Waits until the bytes are on the disk, then gives the file its final name. Standard output gets all
     /// bytes at once, so that a render that fails sends none.
@@ -47,7 +47,7 @@ private:
 
 /// Finds out before a render, rather than after it, that `path` cannot be written: creates and removes a
 /// temporary file beside it. Makes no folder, which would hide a typing error. Throws crt::Error(Output)
-/// with one sentence. What can still go wrong later is a full disk. Standard output that is a terminal is
+/// with one sentence. The only later error is a full disk. Standard output that is a terminal is
 /// refused: it would show an image's bytes as text.
 void checkWritable(const std::string& path);
 

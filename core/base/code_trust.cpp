@@ -81,7 +81,7 @@ std::string nameOfGroup(gid_t group) {
     return std::to_string(group);
 }
 
-/// Whether a group has no members but one trusted user: the group of the user's name that systems with "user
+/// True if a group has no members but one trusted user: the group of the user's name that systems with "user
 /// private groups" make, under which a umask of 002 is harmless.
 bool privateGroup(gid_t group) {
     std::vector<char> group_texts = room(), user_texts = room();
@@ -126,7 +126,7 @@ std::string whyNot(const struct stat& status, const std::string& name) {
     const mode_t mode = status.st_mode;
     if (!trustedOwner(status.st_uid))
         return inQuotationMarks(name) + " belongs to another user (" + nameOfUser(status.st_uid) +
-               "), who could have put anything there";
+               "), who could have replaced it";
     if (S_ISDIR(mode) && (mode & S_ISVTX) != 0) return {};
     const Program& p = program();
     const std::string remedy = " can write to " + inQuotationMarks(name) + " (mode " + modeText(mode) +
@@ -145,13 +145,14 @@ std::string cannotBeOpened(const std::string& name, int error) {
     return inQuotationMarks(name) + " cannot be opened: " + std::strerror(error);
 }
 
-/// Why a folder may not lead to code; empty if it may. `entry`: the path in it that is looked up next.
+/// Reason why a folder may not lead to code; empty if it may. `entry`: the path in it that is looked up
+/// next.
 std::string whyNotIn(const std::string& folder, const std::string& entry, const std::string& home) {
     if (program().known && isAbove(folder, program().path)) return {};
     if (isAbove(folder, home) && (entry == home || isAbove(entry, home))) return {};
     struct stat status {};
     if (::stat(folder.c_str(), &status) != 0)
-        return inQuotationMarks(folder) + " cannot be looked at: " + std::strerror(errno);
+        return inQuotationMarks(folder) + " cannot be inspected: " + std::strerror(errno);
     return whyNot(status, folder);
 }
 
@@ -191,7 +192,7 @@ Judged follow(const std::string& name) {
         if (!trustedOwner(status.st_uid))
             return {{},
                     inQuotationMarks(entry) + " is a link of another user (" + nameOfUser(status.st_uid) +
-                        "), who could have made it lead anywhere"};
+                        "), who could point it anywhere"};
         char target[PATH_MAX];
         const ssize_t length = ::readlink(entry.c_str(), target, sizeof target);
         if (length < 0) return {{}, cannotBeOpened(name, errno)};
@@ -202,7 +203,7 @@ Judged follow(const std::string& name) {
     return way;
 }
 
-/// Why a file that was followed may not be run; `name`: as messages call it.
+/// Reason why a file at the end of links may not be run; `name`: as messages call it.
 std::string whyNotFile(const std::string& path, const std::string& name) {
     // On the descriptor: not blocking, for a pipe waits for who writes to it.
     const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY | O_NOFOLLOW);

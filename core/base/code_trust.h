@@ -1,7 +1,7 @@
-/// Whether a file may be run as code (plugins, compiled kernels, kernel texts): not if somebody could have
-/// written it who may not decide what this program does. The rules are OpenSSH's for its configuration, with
-/// one addition (docs/decisions/0014): the owner and the writers of the program itself are trusted, because
-/// who can change the program needs no plugin. The program is the file that holds this code: crt, or
+/// Decides whether a file may be run as code (plugins, compiled kernels, kernel texts): not if a user
+/// without control over this program could have written it. The rules are OpenSSH's for its configuration,
+/// with one addition (docs/decisions/0014): the owner and the writers of the program itself are trusted,
+/// because who can change the program needs no plugin. The program is the file that holds this code: crt, or
 /// libcrt.so in a program of another owner.
 ///
 /// Uses nothing of the core: it is part of crt::kernel_cache too.
@@ -13,16 +13,16 @@ struct stat;
 
 namespace crt::trust {
 
-/// Who else can write to an open file or folder, as a sentence about `name` with what to do about it; empty
-/// when nobody. It belongs to this user, to root or to the program's owner, and neither everyone nor a group
-/// of other people can write to it. A folder with the sticky bit, as /tmp has, may be written to by
-/// everyone: there nobody can rename or remove what is another's. [any thread]
+/// Other users who can write to an open file or folder, as a sentence about `name` with a remedy; empty if
+/// there are none. It belongs to this user, to root or to the program's owner, and neither everyone nor a
+/// group of other people can write to it. A folder with the sticky bit, as /tmp has, may be writable by
+/// everyone, because there no user can rename or remove another user's files. [any thread]
 std::string whyNot(const struct stat& status, const std::string& name);
 
 /// A name that was resolved once. Callers open `path`, never the name again.
 struct Judged {
     std::string path;  ///< Without links; of use where `why` is empty.
-    std::string why;   ///< Why it may not be run, as a sentence; empty if it may.
+    std::string why;   ///< Reason why it may not be run, as a sentence; empty if it may.
 };
 
 /// The same for code that is opened by its name later, as dlopen() does. Resolves the name as the system

@@ -10,7 +10,7 @@
 
 namespace crt {
 
-/// Where in an input file a message points. `line` and `column` count from 1; 0 means unknown.
+/// The place in an input file to which a message points. `line` and `column` count from 1; 0 means unknown.
 struct SourcePlace {
     std::string file;
     int line = 0;
@@ -27,8 +27,7 @@ struct SourcePlace {
     }
 };
 
-/// What kind of failure this is. The values are the program's exit codes (docs/architecture.md, "Exit
-/// codes").
+/// Kind of the failure. The values are the program's exit codes (docs/architecture.md, "Exit codes").
 enum class ErrorKind : int {
     Internal = 1,  ///< A broken invariant: a bug in crt.
     Usage = 2,     ///< The command line is wrong.

@@ -17,11 +17,11 @@ std::string utcNow();
 /// The most memory this process ever held, in bytes (VmHWM); 0 when the system does not tell.
 std::uint64_t peakHostMemory();
 
-/// What this process may still take without the system's ending it, in bytes: the least of the machine's
-/// free memory, the cgroup's (a container's) and the limit on address space (ulimit -v).
+/// The memory in bytes that this process may still allocate before the system ends it: the least of the
+/// machine's free memory, the cgroup's (a container's) and the limit on address space (ulimit -v).
 std::uint64_t availableHostMemory();
 
-/// What this program was built from and with.
+/// Versions and options with which this program was built.
 struct BuildInfo {
     const char* commit;    ///< "a1b2c3d4e5f6"; "unknown" outside a git checkout.
     bool dirty;            ///< Files differed from the commit.

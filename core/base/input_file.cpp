@@ -93,7 +93,7 @@ std::string readInput(const std::string& path, std::uint64_t most_bytes) {
                                        sizeText(most_bytes)));
     constexpr std::uint64_t kWorthAsking = std::uint64_t{256} << 20;
     if (bytes > kWorthAsking && bytes > availableHostMemory())
-        throw InputRefused(fmt::format("has {}, and {} of memory are free", sizeText(bytes),
+        throw InputRefused(fmt::format("has {}, and only {} of memory is free", sizeText(bytes),
                                        sizeText(availableHostMemory())));
     return readAll(file.get(), bytes, most_bytes);
 }

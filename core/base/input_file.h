@@ -9,14 +9,14 @@
 
 namespace crt {
 
-/// Why a file is not read. what() follows the file's name: "is a directory", "cannot be opened: Permission
-/// denied".
+/// Reason why a file is not read. what() follows the file's name: "is a directory", "cannot be opened:
+/// Permission denied".
 class InputRefused : public std::runtime_error {
 public:
     using std::runtime_error::runtime_error;
 };
 
-/// Bounds by kind, far beyond what people make: a file that has more is another kind of file.
+/// Bounds by kind, far beyond what people make: a larger file cannot be of this kind.
 inline constexpr std::uint64_t kMostSceneBytes = std::uint64_t{256} << 20;
 inline constexpr std::uint64_t kMostMeshBytes = std::uint64_t{32} << 30;
 inline constexpr std::uint64_t kMostMaterialBytes = std::uint64_t{64} << 20;

@@ -20,7 +20,7 @@ std::uint64_t wholeNumber(const Json& json,
     const auto* const value = json.template get_ptr<const typename Json::number_unsigned_t*>();
     if (value == nullptr || *value > most)
         throw Error(ErrorKind::Usage,
-                    fmt::format("has {} for a whole number from 0 to {}",
+                    fmt::format("has {} where a whole number from 0 to {} is expected",
                                 json.is_number() ? json.dump() : json.type_name(), most));
     return *value;
 }

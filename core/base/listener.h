@@ -1,5 +1,5 @@
-/// Who hears what the core says while it works: messages (log.h) and stages of long work (stage.h). There is
-/// no log of the process: whoever asks for work listens on the thread that does it.
+/// Receives what the core reports while it works: messages (log.h) and stages of long work (stage.h). There
+/// is no log of the process: the caller listens on the thread that does the work.
 #pragma once
 
 #include <functional>
@@ -17,7 +17,8 @@ using LogSink = std::function<void(LogLevel, std::string_view)>;
 using StageSink = std::function<void(const std::string& what)>;
 
 struct ListenerState;
-/// What threads hold of a Listener. It may outlive the Listener; then nothing reaches the sinks any more.
+/// The part of a Listener that threads hold. It may outlive the Listener; then nothing reaches the sinks any
+/// more.
 using ListenerRef = std::shared_ptr<ListenerState>;
 
 /// Owns the two sinks, a level, and a count of warnings.
@@ -42,7 +43,7 @@ private:
 ListenerRef currentListener();
 
 /// Makes a listener that of this thread for as long as the scope lives. Scopes nest, and end on the thread
-/// that they began on. A thread that the core starts for somebody takes his listener along:
+/// that they began on. A thread that the core starts for a caller takes the caller's listener along:
 ///
 ///     std::async([listener = currentListener()] { const ListenerScope scope(listener); … });
 class ListenerScope {

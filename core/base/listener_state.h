@@ -1,4 +1,4 @@
-/// What log.cpp and stage.cpp keep for a listener.
+/// The state of a listener that log.cpp and stage.cpp share.
 #pragma once
 
 #include "base/listener.h"
@@ -25,7 +25,7 @@ struct ListenerState {
 
     std::mutex stage_mutex;
     std::vector<const Stage*> stages;  ///< The innermost last.
-    /// Apart from stage_mutex: who hears of a stage may ask which is the innermost.
+    /// Separate from stage_mutex, because the receiver of a stage may query the innermost one.
     std::mutex stage_sink_mutex;
     StageSink stage_sink;
 };

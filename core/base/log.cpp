@@ -21,7 +21,7 @@ void writeToStandardError(LogLevel level, std::string_view message) {
 
 void setLogLevel(LogLevel level) {
     const ListenerRef listener = currentListener();
-    if (!listener) throw Error(ErrorKind::Internal, "a log level is set where nobody listens");
+    if (!listener) throw Error(ErrorKind::Internal, "a log level needs a listener");
     listener->level = level;
 }
 

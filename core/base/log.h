@@ -12,8 +12,8 @@
 
 namespace crt {
 
-/// What reaches the sink of this thread's listener; messages below `level` are dropped. Throws
-/// crt::Error(Internal) where there is no listener.
+/// The least level that reaches the sink of this thread's listener; messages below `level` are dropped.
+/// Throws crt::Error(Internal) where there is no listener.
 void setLogLevel(LogLevel level);
 
 /// Gives one line, made printable, to the listener of this thread. [any thread]
@@ -36,8 +36,8 @@ void logWarning(fmt::format_string<Args...> text, Args&&... args) {
 /// a warning is never lost in a scroll-back.
 int warningCount();
 
-/// Called around each message by whoever draws on the terminal (the progress bar): first to clear its line,
-/// then to redraw.
+/// Called around each message by the owner of the terminal (the progress bar): first to clear its line, then
+/// to redraw.
 using LogHook = void (*)(bool before_message, void* user);
 /// When it returns no thread is inside the old hook, and what it points to may go. Does nothing for null.
 void setLogHook(const ListenerRef& listener, LogHook hook, void* user);

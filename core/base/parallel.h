@@ -1,5 +1,5 @@
-/// Work of the host on all processors (TBB). What is made must not depend on the number of threads: parts
-/// are cut by the amount of work, and what they bring is put together in their order.
+/// Work of the host on all processors (TBB). Results must not depend on the number of threads: parts are cut
+/// by the amount of work, and their results are combined in their order.
 #pragma once
 
 #include <cstddef>
@@ -22,7 +22,7 @@ inline std::size_t partsOf(std::size_t count, std::size_t part) { return (count 
 /// Both, at the same time where a thread is free.
 void parallelInvoke(const std::function<void()>& one, const std::function<void()>& other);
 
-/// Runs `work` so that it, and what it calls of the above, takes at most so many threads; 0: one a
+/// Runs `work` so that it, and what it calls of the above, uses at most this number of threads; 0: one per
 /// processor. More than there are processors are allowed.
 void runWithThreads(unsigned threads, const std::function<void()>& work);
 

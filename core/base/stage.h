@@ -1,6 +1,6 @@
 /// Long work before the first sample, and how far it is: reading meshes, building the BVH, setting up the
-/// device. Whoever works says so with a Stage; the listener of the thread (listener.h) knows of it, and
-/// whoever owns the terminal shows it with a StageProgress.
+/// device. Long work announces itself with a Stage; the listener of the thread (listener.h) records it, and
+/// the owner of the terminal shows it with a StageProgress.
 #pragma once
 
 #include "base/listener.h"
@@ -39,7 +39,7 @@ private:
     const Clock::time_point start_ = Clock::now();
 };
 
-/// What the innermost living stage is, and how far.
+/// The innermost active stage and its progress.
 struct StageState {
     std::string what;
     double amount = 0, done = 0;  ///< As of Stage.

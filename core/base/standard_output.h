@@ -1,5 +1,5 @@
-/// What commands print on standard output. Nothing throws on the way: a full disk is told once, at the end,
-/// and a reader that has had enough (`crt schema | head -1`) is no fault.
+/// Prints the results of commands on standard output. Printing does not throw: a full disk is reported once,
+/// at the end, and a reader that has had enough (`crt schema | head -1`) is no fault.
 #pragma once
 
 #include <fmt/format.h>
@@ -26,8 +26,8 @@ void flushStandardOutput();
 /// pipe.
 std::optional<Error> finishStandardOutput();
 
-/// Standard streams that whoever started crt has closed: opened on nothing, so that no output file gets
-/// their number and their text.
+/// Opens standard streams that were closed when crt started on /dev/null, so that no output file gets their
+/// number and their text.
 void openClosedStreams();
 
 }  // namespace crt

@@ -3,7 +3,7 @@
 ///
 /// A confidence is the part of repeats whose interval covers the truth (0.95), an alpha the part of repeats
 /// that may raise a false alarm (0.05). Distribution functions are Boost.Math's; the rest is written here,
-/// as the cited papers have it. What cannot be asked (a confidence of 1, fewer values than a formula needs)
+/// as the cited papers have it. An invalid argument (a confidence of 1, fewer values than a formula needs)
 /// throws crt::Error(Internal): it is the caller's bug. NaN among data is not dropped: it makes the answer
 /// NaN.
 #pragma once
@@ -80,8 +80,8 @@ const char* verdictName(Verdict verdict);
 /// c)/2 of the time, and one below delta fails as rarely.
 Verdict equivalence(const Interval& difference, double delta);
 
-/// Which of several hypotheses fall, such that the probability that any true one does is at most alpha,
-/// however they depend on each other (Holm 1979). In the order given.
+/// Rejects hypotheses such that the probability that any true one does is at most alpha, however they depend
+/// on each other (Holm 1979). In the order given.
 std::vector<bool> holm(std::span<const double> p_values, double alpha);
 
 /// Alpha of each of `tests` independent tests of which, all hypotheses true, any raises a false alarm with

@@ -1,6 +1,6 @@
-/// What parallel.h takes of TBB. Its file alone sees TBB's headers, whose templates hand work to the
+/// The part of TBB that parallel.h uses. Its file alone sees TBB's headers, whose templates hand work to the
 /// library's threads in ways that ThreadSanitizer cannot follow: it is compiled without that. Work is a
-/// function and a pointer, so that whoever is called can see to the order before it reads any memory.
+/// function and a pointer, so that the callee can establish the memory order before it reads.
 #pragma once
 
 #include <cstddef>
@@ -16,8 +16,8 @@ void forEach(std::size_t count, Call call, void* context);
 /// Calls call(context, 0) and call(context, 1), at the same time where a thread is free.
 void forBoth(Call call, void* context);
 
-/// Calls call(context, 0), perhaps on another thread, so that the above take at most so many threads; 1 or
-/// more.
+/// Calls call(context, 0), perhaps on another thread, so that the above use at most this number of threads;
+/// 1 or more.
 void withThreads(unsigned threads, Call call, void* context);
 
 }  // namespace crt::scheduler

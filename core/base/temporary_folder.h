@@ -16,7 +16,7 @@
 
 namespace crt {
 
-/// A pattern for mkstemp and mkdtemp, which put six letters of their own for the last six.
+/// A pattern for mkstemp and mkdtemp, which replace its last six letters.
 inline std::string temporaryPattern(const std::filesystem::path& parent) {
     return (parent / ("crt-" + std::string(6, 'X'))).string();
 }

@@ -20,13 +20,13 @@ std::string lowerCase(std::string_view text) {
     return lower;
 }
 
-/// Why `text` is no decimal number, or nothing.
+/// Reason why `text` is not a decimal number, or nothing.
 std::string notDecimal(const std::string& text) {
     std::string_view body = text;
     if (!body.empty() && (body.front() == '+' || body.front() == '-')) body.remove_prefix(1);
     const std::string lower = lowerCase(body);
     if (lower == "nan" || lower == ".nan" || lower == "inf" || lower == ".inf" || lower == "infinity")
-        return "NaN and infinity have no place in a scene";
+        return "a scene cannot contain NaN or infinity";
     if (lower.starts_with('+') || lower.starts_with('-')) return "it is not a number";
     if (lower.starts_with("0x") || lower.starts_with("0o") || lower.starts_with("0b"))
         return "write it in decimal";
@@ -178,7 +178,7 @@ std::vector<std::string> parseList(const std::string& text, const std::string& o
     for (const std::string& word : words)
         if (word.empty())
             throw Error(ErrorKind::Usage,
-                        fmt::format("{} takes names with commas between them, such as cuda,embree, not '{}'",
+                        fmt::format("{} takes names separated by commas, such as cuda,embree, not '{}'",
                                     option, text));
     return words;
 }

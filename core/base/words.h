@@ -10,7 +10,7 @@
 
 namespace crt {
 
-/// What became of a text that should be a number: the number, or why not.
+/// Result of reading a number from text: the number, or the reason why there is none.
 template <class T>
 struct Parsed {
     std::optional<T> value;

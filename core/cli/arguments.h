@@ -29,11 +29,11 @@ SampleRange parseSampleRange(const std::string& text, const std::string& option)
 /// "x0,y0,x1,y1".
 std::array<int, 4> parseRectangle(const std::string& text, const std::string& option);
 
-/// What the program's arguments (without its name) mean once abbreviations are written out: a first word
-/// that is none of `commands` is preceded by "render"; "--resume FILE.crtfilm" becomes
-/// "--resume=FILE.crtfilm" and "--resume" before anything else "--resume=auto", so that it never swallows
-/// the scene; the same with compare's "--json FILE.json", or "--json=-". Throws crt::Error(Usage) for a
-/// first word that is a command misspelt.
+/// Expands abbreviations in the program's arguments (without its name): a first word that is none of
+/// `commands` is preceded by "render"; "--resume FILE.crtfilm" becomes "--resume=FILE.crtfilm" and
+/// "--resume" before anything else "--resume=auto", so that it never swallows the scene; the same with
+/// compare's "--json FILE.json", or "--json=-". Throws crt::Error(Usage) for a first word that is a command
+/// misspelt.
 std::vector<std::string> writtenOut(std::vector<std::string> arguments,
                                     const std::vector<std::string>& commands);
 

@@ -9,15 +9,15 @@
 
 namespace crt {
 
-/// What a shell offers where a value stands.
+/// Completions that a shell offers for a value.
 struct Completion {
     enum class Kind {
         None,
-        File,     ///< Whose extension is one of `words`, without the dot; any where there is none.
+        File,     ///< Files whose extension is one of `words`, without the dot; all files if it is empty.
         Folder,
         Word,     ///< One of `words`.
-        Backend,  ///< What `crt plugins` lists.
-        Data,     ///< What `crt data` lists.
+        Backend,  ///< The names that `crt plugins` lists.
+        Data,     ///< The names that `crt data` lists.
         Command,
     };
     Kind kind = Kind::None;

@@ -27,8 +27,8 @@ constexpr const char* kSummary =
 
 constexpr const char* kExamples = R"(
 Examples:
-  crt configs/cornell_box.yaml                        with the best backend there is
-  crt --backend cuda configs/cornell_box.yaml         with this one; all give the same bits
+  crt configs/cornell_box.yaml                        with the best backend available
+  crt --backend cuda configs/cornell_box.yaml         with this backend; all give the same bits
   crt scene.yaml --spp 1024 -o a.exr -o a.png         more samples, into these files
   crt scene.yaml --time 30m                           as many samples as 30 minutes allow
   crt scene.yaml --target-error 1%                    as many as it takes for an error of 1 % of the mean
@@ -229,7 +229,7 @@ private:
         if (dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr && !left.empty())
             throw Error(ErrorKind::Usage,
                         command->get_name() == "render"
-                            ? fmt::format("one scene at a time: '{}' is one too many", left.front())
+                            ? fmt::format("crt renders one scene at a time: remove '{}'", left.front())
                             : fmt::format("{} does not know what to do with '{}'", place, left.front()));
         if (dynamic_cast<const CLI::ArgumentMismatch*>(&error) != nullptr) {
             const std::string text = error.what();  // "--spp: 1 required TEXT missing"

@@ -15,8 +15,8 @@ public:
 
     const std::vector<Command>& commands() const { return commands_; }
 
-    /// What `crt COMMAND --help` prints; of no command what `crt --help` prints. Throws crt::Error(Usage)
-    /// for a command that there is not.
+    /// The text that `crt COMMAND --help` prints; without a command the text of `crt --help`. Throws
+    /// crt::Error(Usage) for a command that there is not.
     std::string help(const std::string& command = {}) const;
 
     /// Runs what argv asks for and returns the exit code. Throws crt::Error.

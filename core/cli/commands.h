@@ -1,5 +1,5 @@
-/// The commands of crt: one file each, which declares its options and runs it. What they print goes to
-/// standard output, messages go to standard error.
+/// The commands of crt: one file each, which declares its options and runs it. Their output goes to standard
+/// output, messages go to standard error.
 #pragma once
 
 #include "cli/command.h"

@@ -29,17 +29,18 @@ namespace {
 constexpr int kDifferent = 7;
 
 constexpr const char* kCompareHelp = R"(
-What is printed: whether the bits are the same; where the first difference is, with both values and how many
-floats lie between them (ulp); errors over all values of R, G and B; what it looks like (FLIP, Delta E).
-Where an image says how large its noise is (output AOV 'variance' or 'error', or a reference of 'crt
-reference'), also whether the difference is noise or bias: the bias of each channel with its 99.9 %
-interval, and how many tiles and pixels differ by more than noise would let any of them (alpha 0.1 %). One
-NaN or infinity voids all of it: nothing is dropped.
+Prints whether the bits are the same; the first difference, with both values and the number of floats
+between them (ulp); errors over all values of R, G and B; and the perceived difference (FLIP, Delta E). If
+an image states its noise (output AOV 'variance' or 'error', or a reference of 'crt reference'), it also
+prints whether the difference is noise or bias: the bias of each channel with its 99.9 % interval, and the
+number of tiles and pixels that differ by more than noise allows (alpha 0.1 %). A single NaN or infinity
+makes the whole comparison void; no value is dropped.
 
-With --backends, the scene is rendered with one seed by all, which crt's own backends do to the same bits,
-and with other seeds for a verdict: PASS when the 99.9 % interval of the means' difference lies within
-+-delta and no tile and no pixel differs by more than noise, FAIL when one does for certain, INCONCLUSIVE
-when more samples are needed or one value carries too much of the error. The exit code is 7 unless all PASS.
+With --backends, every backend renders the scene with the same seed, for which crt's own backends give the
+same bits, and with different seeds for a verdict: PASS if the 99.9 % interval of the difference of the
+means lies within +-delta and no tile and no pixel differs by more than noise, FAIL if one does for
+certain, INCONCLUSIVE if more samples are needed or one value carries too much of the error. The exit code
+is 7 unless all PASS.
 
 Examples:
   crt compare cuda.exr embree.exr                        are they the same bits?
@@ -93,7 +94,7 @@ void requireNothingMore(const CompareArguments& arguments, const std::string& mi
           {"--map", &arguments.map_file, "a z map"}})
         if (!file->empty())
             throw Error(ErrorKind::Usage,
-                        fmt::format("{}: there is no {}, because {}", option, what, mismatch));
+                        fmt::format("{}: cannot make {}: {}", option, what, mismatch));
 }
 
 std::vector<std::string> named(const std::vector<std::string>& files) {
@@ -114,7 +115,7 @@ int compareFiles(const CompareArguments& arguments) {
         throw Error(
             ErrorKind::Usage,
             fmt::format(
-                "there is nothing to compare '{}' with; name a second image, or backends with --backends",
+                "'{}' needs a second image to compare with, or backends (--backends)",
                 arguments.first));
     if (arguments.scene.seed || arguments.scene.crop || !arguments.scene.overrides.empty())
         throw Error(ErrorKind::Usage, "--set, --seed and --crop change a scene, and need --backends");
@@ -136,14 +137,14 @@ int compareFiles(const CompareArguments& arguments) {
 
     const Comparison comparison{&result, noise ? &*noise : nullptr, reference ? &*reference : nullptr};
     print(arguments, comparisonText(comparison), comparisonJson(comparison));
-    // What was asked for and cannot be is an error, and not an answer that leaves it out.
+    // An output that was requested and cannot be made is an error; crt does not silently leave it out.
     if (!result.mismatch.empty()) requireNothingMore(arguments, result.mismatch);
     if (!arguments.difference_file.empty()) writeDifference(arguments.difference_file, a, b);
     if (!arguments.map_file.empty()) {
         if (!noise)
             throw Error(
                 ErrorKind::Usage,
-                "there is no z map of images that lack R, G and B or hold values that are not finite");
+                "a z map needs finite values in the channels R, G and B");
         writeZMap(arguments.map_file, *noise, a.width, a.height);
     }
     return result.same ? 0 : kDifferent;
@@ -152,7 +153,7 @@ int compareFiles(const CompareArguments& arguments) {
 int compareBackends(const CompareArguments& arguments) {
     if (!arguments.second.empty())
         throw Error(ErrorKind::Usage,
-                    fmt::format("--backends takes one scene: '{}' is one too many", arguments.second));
+                    fmt::format("--backends takes one scene: remove '{}'", arguments.second));
     SceneRequest request = arguments.scene;
     request.file = arguments.first;
     const Scene scene = loadScene(request);
@@ -174,10 +175,11 @@ int compare(const CompareArguments& arguments) {
 }
 
 OptionGroup sameOrNot(CompareArguments& to) {
-    return {"Same or not (exit code)",
+    return {"Equality (exit code)",
             {{.names = "--tolerance",
               .placeholder = "X",
-              .help = "RMS difference, as a share of B's mean, that counts as equal (0: same bits)",
+              .help = "RMS difference, as a share of B's mean, below which the images count as equal (0: "
+                      "same bits)",
               .read = [&to](const std::string& text) {
                   to.options.tolerance = parseTolerance(text, "--tolerance");
               }},
@@ -188,10 +190,10 @@ OptionGroup sameOrNot(CompareArguments& to) {
 }
 
 OptionGroup moreToSee(CompareArguments& to) {
-    return {"More to see",
+    return {"More output",
             {{.names = "--reference",
               .placeholder = "FILE",
-              .help = "errors of A and of B against this image, side by side",
+              .help = "compare the errors of A and of B against this image",
               .read = [&to](const std::string& text) { to.reference = text; },
               .completion = completeImage()},
              {.names = "--diff",
@@ -206,7 +208,7 @@ OptionGroup moreToSee(CompareArguments& to) {
               .completion = completeImage()},
              {.names = "--json",
               .placeholder = "[FILE]",
-              .help = "all numbers as JSON: into FILE.json too, or instead of the text",
+              .help = "write all numbers as JSON: to FILE.json, or instead of the text",
               .read = [&to](const std::string& text) { to.json_file = text; },
               .completion = completeFile({"json"})}}};
 }
@@ -217,24 +219,24 @@ OptionGroup backendsInstead(CompareArguments& to) {
     group.options = {
         {.names = "--backends",
          .placeholder = "X,Y",
-         .help = "render scene A with each; the last is what the others are compared with",
+         .help = "render scene A with each backend; the last is the reference",
          .read = [&options](const std::string& text) { options.backends = parseList(text, "--backends"); },
          .completion = {Completion::Kind::Backend}},
         {.names = "--spp",
          .placeholder = "N",
-         .help = "samples per pixel of each render (so many that all replicates have the scene's)",
+         .help = "samples per pixel of each render (by default the replicates together have the scene's)",
          .read = [&options](const std::string& text) { options.samples = parseCount(text, "--spp", 1); },
          .needs = {"--backends"}},
         {.names = "--replicates",
          .placeholder = "R",
-         .help = "renders of each backend, every one with its own seed (16)",
+         .help = "renders per backend, each with a different seed (16)",
          .read = [&options](const std::string& text) {
              options.replicates = smallCount(text, "--replicates", 2);
          },
          .needs = {"--backends"}},
         {.names = "--delta",
          .placeholder = "PERCENT",
-         .help = "means that differ by less are equivalent (1%)",
+         .help = "relative difference of means that counts as equivalent (1%)",
          .read = [&options](const std::string& text) {
              options.gate.delta = parseFraction(text, "--delta");
          },
@@ -252,11 +254,11 @@ Command compareCommand() {
     return {.name = "compare",
             .summary = "compare two images, or backends; exit code 7 when they differ",
             .arguments = {{.name = "A",
-                           .help = "image; with --backends a scene",
+                           .help = "image, or a scene with --backends",
                            .read = [to](const std::string& text) { to->first = text; },
                            .completion = completeFile({"exr", "png", "ppm", "pfm", "yaml"})},
                           {.name = "B",
-                           .help = "image; relative numbers are relative to it",
+                           .help = "image that relative numbers refer to",
                            .read = [to](const std::string& text) { to->second = text; },
                            .completion = completeImage(),
                            .required = false}},

@@ -27,11 +27,11 @@ struct State {
 
 OptionGroup what(State& state) {
     converge::ConvergeRequest& request = state.request;
-    OptionGroup group{"What is measured"};
+    OptionGroup group{"Measurement"};
     group.options = {
         {.names = "--backends",
          .placeholder = "X,Y",
-         .help = "of these; one that cannot run is left out and named (embree,opencl,cuda)",
+         .help = "backends to measure; those that cannot run are left out and reported (embree,opencl,cuda)",
          .read = [&request](const std::string& text) { request.backends = parseList(text, "--backends"); },
          .completion = {Completion::Kind::Backend}},
         {.names = "--vary",
@@ -43,30 +43,30 @@ OptionGroup what(State& state) {
          .repeatable = true},
         {.names = "--reference",
          .placeholder = "FILE",
-         .help = "of 'crt reference', for the scene it is of; or a number, the luminance of every "
-                 "pixel; repeatable",
+         .help = "file from 'crt reference' for its scene, or a number: the luminance of every pixel; "
+                 "repeatable",
          .read = [&request](const std::string& text) { request.references.push_back(text); },
          .completion = completeFile({"exr"}),
          .repeatable = true},
         {.names = "--time",
          .placeholder = "DURATION",
-         .help = "for everything (60s)",
+         .help = "total time (60s)",
          .read = [&request](const std::string& text) { request.seconds = parseDuration(text, "--time"); }},
         {.names = "--replicates",
          .placeholder = "R",
-         .help = "seeds of each, at least (16); more where there is time",
+         .help = "minimum number of seeds per configuration (16); more if there is time",
          .read = [&request](const std::string& text) {
              request.replicates = smallCount(text, "--replicates", 2);
          }},
         {.names = "--max-spp",
          .placeholder = "N",
-         .help = "no more samples per pixel than this",
+         .help = "maximum number of samples per pixel",
          .read = [&request](const std::string& text) {
              request.max_samples = parseCount(text, "--max-spp", 1);
          }},
         {.names = "--resolution",
          .placeholder = "N",
-         .help = "longer side in pixels, where --set film.resolution does not say (128); 0: the scene's",
+         .help = "longer side in pixels (128); 0: as in the scene; --set film.resolution overrides it",
          .read = [&request](const std::string& text) {
              request.resolution = static_cast<int>(smallCount(text, "--resolution", 0));
          }},
@@ -77,7 +77,7 @@ OptionGroup what(State& state) {
 
 OptionGroup where(State& state) {
     converge::ConvergeRequest& request = state.request;
-    return {"Where",
+    return {"Device and output",
             {deviceOption(request.integrator), threadsOption(request.integrator),
              {.names = "-o,--output",
               .placeholder = "DIR",
@@ -86,17 +86,19 @@ OptionGroup where(State& state) {
               .completion = {Completion::Kind::Folder}},
              {.names = "--resume",
               .placeholder = {},
-              .help = "go on with the run in that folder, of the same experiment",
+              .help = "continue the run in that folder, with the same experiment",
               .read = [&request](const std::string&) { request.resume = true; }},
              noProgressOption(state.progress)}};
 }
 
 constexpr const char* kConvergeNotes =
-            "\nRenders every scene with every backend and variant, again and again with other seeds, looks "
-            "at 1, 2, 4 ... samples, and writes one\n"
-            "page: error against seconds with its interval, efficiency, bias, whether the images' own error "
-            "estimates hold, where the time goes.\n"
-            "Where no --reference is given, a quarter of --time makes one.\n"
+            "\nRenders every scene with every backend and variant, repeatedly with different seeds, "
+            "measures "
+            "the error at 1, 2, 4 ... samples, and writes\n"
+            "one page: error against seconds with its interval, efficiency, bias, reliability of the "
+            "images' "
+            "own error estimates, and time by stage.\n"
+            "Without --reference, a quarter of --time is spent on making one.\n"
             "docs/error.md explains the terms. Python makes the page, with jinja2 and matplotlib; "
             "'python -m crt report DIR' does it later.\n"
             "\nExamples:\n"

@@ -18,14 +18,14 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr const char* kDataNotes = R"(
-In a scene, wherever a spectrum can stand:
+In a scene, in place of any spectrum:
   reflectance: {data: cornell/white}
   ior: {data: glasses/SF10}
   radiance: {data: illuminants/D65, scale: 10}
   {type: conductor, eta: {data: metals/Au/n}, k: {data: metals/Au/k}}
 
 Further families are folders of CSV files with the same header, in a folder of CRT_DATA_PATH:
-  crt data paints/foliage > mine/paints/meadow.csv          and then change it
+  crt data paints/foliage > mine/paints/meadow.csv          and then edit it
   CRT_DATA_PATH=mine crt scene.yaml                         with {data: paints/meadow}
 )";
 
@@ -34,8 +34,8 @@ NamedData rowOf(const std::string& name) {
     const std::vector<std::string> names = dataNames();
     const std::string hint = didYouMean(name, names);
     throw Error(ErrorKind::Usage,
-                fmt::format("there are no data '{}'; {}", name,
-                            hint.empty() ? "'crt data' lists what there is" : hint));
+                fmt::format("there is no data set '{}'; {}", name,
+                            hint.empty() ? "'crt data' lists all data sets" : hint));
 }
 
 std::string rangeText(const NamedData& row) {
@@ -129,7 +129,7 @@ Command dataCommand() {
     return {.name = "data",
             .summary = "list the measured spectra that come with crt, or print one",
             .arguments = {{.name = "NAME",
-                           .help = "of one of them, such as cornell/white",
+                           .help = "name of a spectrum, such as cornell/white",
                            .read = [state](const std::string& text) { state->name = text; },
                            .completion = {Completion::Kind::Data},
                            .required = false}},

@@ -59,7 +59,8 @@ void requireDevelopmentKey(const std::string& path) {
         throw Error(
             ErrorKind::Usage,
             fmt::format(
-                "--set {}: the samples of a film depend on '{}', so this needs a render ('crt render'); {}",
+                "--set {}: changing '{}' needs a new render ('crt render'), because the samples depend on "
+                "it; {}",
                 path, path, offer));
     const std::vector<std::string> keys(kDevelopmentKeys.begin(), kDevelopmentKeys.end());
     const bool short_form = std::find(keys.begin(), keys.end(), "film." + path) != keys.end();
@@ -91,7 +92,7 @@ std::optional<Vec3d> namedWhite(const FilmRecord& record, const std::string& nam
     for (const auto& [light, white] : record.whites) known.push_back(light);
     const std::string hint = didYouMean(name, known);
     throw Error(ErrorKind::Usage,
-                fmt::format("--set film.white_balance: the film knows no light '{}'; {}", name,
+                fmt::format("--set film.white_balance: the film contains no light '{}'; {}", name,
                             hint.empty() ? fmt::format("it knows {}", fmt::join(known, ", ")) : hint));
 }
 
@@ -102,8 +103,8 @@ void setWindow(FilmRecord& record, const std::array<int, 4>& window) {
         throw Error(
             ErrorKind::Usage,
             fmt::format(
-                "the crop window {},{},{},{} is no rectangle within {},{},{},{}, which the film holds "
-                "of {} × {} pixels",
+                "the crop window {},{},{},{} is not a rectangle within {},{},{},{}, the part of {} × {} "
+                "pixels that the film holds",
                 x0, y0, x1, y1, left, top, right, bottom, record.width, record.height));
     record.window = window;
 }
@@ -156,7 +157,7 @@ std::uint32_t aovsNamed(const std::vector<std::string>& names) {
     return aovs;
 }
 
-/// What can be refused before films, which may be large, are read.
+/// Refusals that are possible before the films, which may be large, are read.
 OutputPlan planDevelopment(const DevelopArguments& arguments) {
     OutputPlan plan = planOutputs(arguments.outputs, Scene{});
     if (!plan.films.empty())
@@ -167,7 +168,7 @@ OutputPlan planDevelopment(const DevelopArguments& arguments) {
                                      [](const Output& o) { return o.format == OutputFormat::Exr; });
     if (!arguments.aovs.empty() && !has_exr)
         throw Error(ErrorKind::Usage,
-                    "--aovs: only .exr files hold more than the image, and no output is one");
+                    "--aovs: only .exr files can hold AOVs, and no output is one");
     for (const SceneOverride& change : arguments.changes) requireDevelopmentKey(change.path);
     const std::uint32_t aovs = aovsNamed(arguments.aovs);
     for (Output& image : plan.images)
@@ -224,7 +225,7 @@ constexpr const char* kDevelopNotes =
             "  crt scene.yaml -o scene.crtfilm                                       render once\n"
             "  crt develop scene.crtfilm -o a.png --set film.exposure_ev=1           one stop brighter\n"
             "  crt develop scene.crtfilm -o a.png --expose auto                      "
-            "as bright as it should be\n"
+            "exposed automatically\n"
             "  crt develop scene.crtfilm -o b.png --set film.white_balance=D50\n"
             "  crt develop scene.crtfilm -o c.exr -o c.png --crop 100,50,300,250\n"
             "  crt develop scene.crtfilm -o d.exr --aovs albedo,normal,error,samples\n"
@@ -237,7 +238,7 @@ Command developCommand() {
     const auto to = std::make_shared<DevelopArguments>();
     return {
         .name = "develop",
-        .summary = "make images of a film again, with other exposure, white balance, colours or crop",
+        .summary = "make images from a film, with a new exposure, white balance, colour space or crop",
         .arguments = {{.name = "FILM",
                        .help = "films (.crtfilm) of one scene",
                        .read = [to](const std::string& text) { to->films.push_back(text); },
@@ -253,7 +254,7 @@ Command developCommand() {
                       .required = true},
                      {.names = "--set",
                       .placeholder = "KEY=VALUE",
-                      .help = "change how it is developed, e.g. film.exposure_ev=1; repeatable",
+                      .help = "change a development setting, e.g. film.exposure_ev=1; repeatable",
                       .read = [to](const std::string& text) { to->changes.push_back(parseOverride(text)); },
                       .repeatable = true},
                      exposeOption(to->expose_automatically),
@@ -263,7 +264,7 @@ Command developCommand() {
                       .read = [to](const std::string& text) { to->crop = parseRectangle(text, "--crop"); }},
                      {.names = "--aovs",
                       .placeholder = "A,B",
-                      .help = "what .exr files hold beside the image (what the scene asks for), or none",
+                      .help = "AOVs to write to .exr files (default: those of the scene), or none",
                       .read = [to](const std::string& text) { to->aovs = parseList(text, "--aovs"); }},
                      quietOption("only warnings and errors")}}},
         .notes = kDevelopNotes,

@@ -17,7 +17,7 @@ Command helpCommand(const CommandLine& all) {
     return {.name = "help",
             .summary = "explain a command, as its --help does",
             .arguments = {{.name = "COMMAND",
-                           .help = "of these; without one, the page of crt itself",
+                           .help = "command to explain; by default crt itself",
                            .read = [state](const std::string& text) { state->command = text; },
                            .completion = {Completion::Kind::Command},
                            .required = false}},

@@ -17,13 +17,13 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kImportNotes = R"(
-The scene names the model, whose meshes and images stay where they are: materials, lights and camera are
-there to be changed. What crt does not have, and what it chose, is said in a warning and at the top of the
-scene.
+The scene refers to the model, whose meshes and images stay in their files; its materials, lights and camera
+are written out for editing. A warning, and a comment at the top of the scene, list the features that crt
+ignores or approximates and the values that it chose.
 
   crt import product.glb -o product.yaml
   crt product.yaml --spp 256
-  crt product.glb               the same picture, without the scene in between
+  crt product.glb               the same image, without writing a scene
 )";
 
 struct Request {
@@ -35,8 +35,7 @@ void write(const std::string& path, const std::string& text, bool overwrite) {
     std::error_code unknown;
     if (!overwrite && fs::exists(path, unknown))
         throw Error(ErrorKind::Usage,
-                    fmt::format("'{}' is there already, and may have been changed by hand; --overwrite "
-                                "replaces it",
+                    fmt::format("'{}' exists and may have been edited by hand; --overwrite replaces it",
                                 path));
     AtomicFile file(path);
     file.write(text.data(), text.size());
@@ -45,11 +44,11 @@ void write(const std::string& path, const std::string& text, bool overwrite) {
 
 int import(const Request& request) {
     if (const std::string other = otherRendererOf(request.model); !other.empty())
-        throw Error(ErrorKind::Usage, fmt::format("'{}' is a scene of {}; {}", request.model, other,
+        throw Error(ErrorKind::Usage, fmt::format("'{}' is a {} scene; {}", request.model, other,
                                                   importHint(request.model)));
     if (!isModel(request.model))
         throw Error(ErrorKind::Usage,
-                    fmt::format("'{}' is no model that crt reads: it imports .glb, .gltf, .obj and .ply",
+                    fmt::format("crt cannot import '{}': it reads .glb, .gltf, .obj and .ply",
                                 request.model));
     const bool to_file = !request.output.empty() && request.output != "-";
     ImportOptions options;
@@ -82,16 +81,16 @@ Command importCommand() {
             .groups = {{"Options",
                         {{.names = "-o,--output",
                           .placeholder = "SCENE",
-                          .help = "the scene to write; standard output when left out, or -",
+                          .help = "output scene; standard output by default, or -",
                           .read = [request](const std::string& text) { request->output = text; },
                           .completion = completeFile({"yaml", "yml"})},
                          {.names = "--overwrite",
                           .placeholder = {},
-                          .help = "replace a scene that is there",
+                          .help = "replace an existing scene",
                           .read = [request](const std::string&) { request->overwrite = true; }},
                          {.names = "--allow-outside",
                           .placeholder = {},
-                          .help = "a glTF file may name buffers and images outside its folder",
+                          .help = "let a glTF file use buffers and images outside its folder",
                           .read = [request](const std::string&) { request->allow_outside = true; }}}}},
             .notes = kImportNotes,
             .run = [request](const std::string&) { return import(*request); }};

@@ -121,13 +121,14 @@ std::string acceleratorText(const CompiledScene& compiled) {
     if (compiled.header().features & CRT_FEATURE_AABB)
         return fmt::format("a box around each of {}", counted(compiled.objects, "object", "objects"));
     if (compiled.shapes > 0) return "a loop over all triangles and shapes";
-    return compiled.triangles == 0 ? "none: there is nothing to hit" : "a loop over all triangles";
+    return compiled.triangles == 0 ? "none: the scene has no surfaces" : "a loop over all triangles";
 }
 
 std::string scheduleText(const Scene& scene, const CompiledScene& compiled) {
     return wantsWavefront(compiled.header().features, static_cast<std::uint32_t>(scene.integrator.max_depth))
-               ? "cuda traces and shades by kernels of their own, paths sorted by material (--kernel lean)"
-               : "one kernel takes a path to its end";
+               ? "cuda uses separate kernels for tracing and shading, with paths sorted by material "
+                 "(--kernel lean)"
+               : "one kernel traces and shades each whole path";
 }
 
 void showScene(const SceneRequest& what, bool verbose) {
@@ -164,7 +165,7 @@ void showScene(const SceneRequest& what, bool verbose) {
                                                 " of the kernel; --verbose lists them");
     printRow("scene blob", bytesText(static_cast<double>(compiled.size_bytes)));
     printRow("scene hash", compiled.hash);
-    printRow("times", fmt::format("{} to read, {} to compile, {} of it for the accelerator",
+    printRow("times", fmt::format("{} to read, {} to compile (including {} for the accelerator)",
                                   durationText(scene.parse_seconds), durationText(compiled.compile_seconds),
                                   durationText(compiled.build_seconds)));
 }
@@ -237,7 +238,7 @@ void showImage(const std::string& file) {
         printRow(key.c_str(), key == kWhiteLuminanceKey ? value + " cd/m² at (1, 1, 1)" : value);
 }
 
-/// What a scene needs, or what a film or an image holds, by the name's extension.
+/// Describes a scene, a film or an image, by the extension of its name.
 int showInfo(const SceneRequest& what, bool verbose) {
     if (std::filesystem::path(what.file).extension() == kCheckpointExtension) {
         showFilm(what.file);
@@ -261,11 +262,12 @@ Command infoCommand() {
     addSceneChanges(options, state->request);
     options.options.push_back({.names = "-v,--verbose",
                                .placeholder = {},
-                               .help = "list what the kernel leaves out for this scene, and why",
+                               .help = "list the features that the kernel leaves out for this scene, and "
+                                       "why",
                                .read = [state](const std::string&) { state->verbose = true; }});
     return {
         .name = "info",
-        .summary = "say what a scene needs, or what a .crtfilm or an image holds",
+        .summary = "describe a scene, a .crtfilm or an image",
         .arguments = {{.name = "FILE",
                        .help = "scene (- for standard input), film or image",
                        .read = [state](const std::string& text) { state->request.file = text; },

@@ -83,27 +83,27 @@ struct Variable {
 };
 
 constexpr std::array kVariables{
-    Variable{"CRT_BACKEND", "The backend, where --backend does not say it."},
-    Variable{"CRT_DEVICE", "Its device, where --device does not say it."},
+    Variable{"CRT_BACKEND", "The backend, unless --backend is given."},
+    Variable{"CRT_DEVICE", "The device, unless --device is given."},
     Variable{"CRT_BACKEND_PATH", "Folders searched for backends first, separated by colons."},
-    Variable{"CRT_MESH_PATH", "Folders searched for meshes and spectra that are not beside the scene."},
+    Variable{"CRT_MESH_PATH", "Folders searched for meshes and spectra that are not in the scene's folder."},
     Variable{"CRT_DATA_PATH", "Folders searched for named data before those of crt."},
     Variable{"CRT_PYTHON",
-             "The Python that makes the pages of converge and verify, instead of python3; empty: none."},
+             "The Python that makes the pages of converge and verify, instead of python3; empty: make no "
+             "pages."},
     Variable{"CRT_CACHE_DIR",
-             "Where compiled kernels are kept, instead of crt in $XDG_CACHE_HOME or ~/.cache."},
+             "The folder for compiled kernels, instead of crt in $XDG_CACHE_HOME or ~/.cache."},
     Variable{"CRT_KERNEL_DIR", "Kernel headers to be compiled instead of those in the program."},
     Variable{"CRT_OPENCL_WAVES",
              "1: OpenCL renders scenes of many materials on a processor as it does on a GPU, for tests."},
-    Variable{"CUDA_HOME", "Where NVRTC is, when the system does not find it."},
+    Variable{"CUDA_HOME", "The path of NVRTC, if the system does not find it."},
     Variable{
         "CRT_SCENE_MEMORY",
-        "The memory that a scene may take when its placements and aliases are written out, such as 20GB."},
+        "The maximum memory of a scene after its placements and aliases are expanded, such as 20GB."},
     Variable{"CRT_TABLE_SECONDS",
-             "The seconds of a processor that tables of rough materials may take before the first sample, "
-             "instead of 6."},
+             "The maximum processor time, in seconds, for the tables of rough materials, instead of 6."},
     Variable{"SOURCE_DATE_EPOCH", "Seconds since 1970 that images and films carry as their date."},
-    Variable{"NO_COLOR", "Set to anything: crt verify prints without colours."},
+    Variable{"NO_COLOR", "If set, crt verify prints without colours."},
 };
 
 }  // namespace

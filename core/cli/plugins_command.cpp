@@ -62,7 +62,7 @@ int printPluginsJson() {
 Command pluginsCommand() {
     const auto json = std::make_shared<bool>(false);
     return {.name = "plugins",
-            .summary = "list the backends, their devices, and why one cannot run",
+            .summary = "list the backends and their devices, and explain why one cannot run",
             .groups = {{"Options",
                         {{.names = "--json",
                           .placeholder = {},

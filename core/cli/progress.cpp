@@ -39,8 +39,8 @@ void writeStderr(std::string_view text) {
     }
 }
 
-/// What the target error, or 1 % where there is none, would still take. Power-of-two checks may make it
-/// more.
+/// The samples and time that the target error, or 1 % without one, would still take. Power-of-two checks may
+/// make it more.
 std::string stillNeeded(const ProgressState& state) {
     const double target = state.target_error > 0 ? state.target_error : 0.01;
     // A bound forecasts nothing: the error lies below it by an unknown factor.
@@ -59,7 +59,7 @@ std::string stillNeeded(const ProgressState& state) {
 std::string progressText(const ProgressState& state) {
     if (!state.label.empty() && state.target == 0)
         return fmt::format("{}  {}", state.label, clockText(state.elapsed_seconds));
-    // What is left cannot be told from nothing.
+    // The rest is indistinguishable from nothing.
     if (!state.label.empty() && state.secondsLeft() < 0)
         return fmt::format("{:3.0f} %  {}", std::floor(state.fraction() * 100), state.label);
     if (!state.label.empty())
@@ -106,7 +106,7 @@ Progress::Progress(ProgressMode mode) : mode_(mode), listener_(currentListener()
 Progress::~Progress() {
     if (mode_ != ProgressMode::Bar) return;
     setLogHook(listener_, nullptr, nullptr);
-    clear();  // What comes next, the summary, says more than the last state of the bar.
+    clear();  // The summary that follows says more than the last state of the bar.
 }
 
 void Progress::update(const ProgressState& state) {

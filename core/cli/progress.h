@@ -53,7 +53,7 @@ private:
     const ListenerRef listener_;
     std::mutex mutex_;
     Clock::time_point shown_at_;
-    std::string text_;       ///< What the bar shows; empty before the first update.
+    std::string text_;       ///< Text of the bar; empty before the first update.
 };
 
 }  // namespace crt

@@ -31,11 +31,11 @@ OptionGroup options(State& state) {
          .read = [&request](const std::string& text) { request.samples = parseCount(text, "--spp", 8); }},
         {.names = "--time",
          .placeholder = "DURATION",
-         .help = "about this long (60s)",
+         .help = "approximate time (60s)",
          .read = [&request](const std::string& text) { request.seconds = parseDuration(text, "--time"); }},
         {.names = "--same-estimator",
          .placeholder = {},
-         .help = "keep integrator.nee: much less noise in scenes with small lamps",
+         .help = "keep integrator.nee as it is: much less noise in scenes with small lights",
          .read = [&request](const std::string&) { request.same_estimator = true; }},
         backendOption(request.backend),
     };
@@ -45,12 +45,12 @@ OptionGroup options(State& state) {
 }
 
 constexpr const char* kReferenceNotes =
-    "\nAnother seed, independent samples, no roulette, and light sampling switched: as little as "
-    "possible in common with what it will judge.\n"
-    "Light sampling stays on where the scene has lights that nothing else finds: point, spot, ies, "
-    "beam and directional.\n"
-    "The file holds the mean and eight independent eighths of it, from which its own error "
-    "follows.\n"
+    "\nA reference has as little as possible in common with the images that are measured against it: it "
+    "uses a different seed, independent\n"
+    "samples, no roulette, and light sampling switched on or off. Light sampling stays on in scenes with "
+    "lights that only it finds:\n"
+    "point, spot, ies, beam and directional. The file holds the mean and eight independent parts of it, "
+    "which give its own error.\n"
     "\nExamples:\n"
     "  crt reference scene.yaml -o ref.exr --time 10m\n"
     "  crt reference scene.yaml -o ref.exr --spp 65536 --same-estimator --set "

@@ -14,7 +14,7 @@ namespace crt {
 namespace {
 
 OptionGroup what(Job& job) {
-    OptionGroup group{"What is rendered"};
+    OptionGroup group{"Samples and scene"};
     group.options = {
         {.names = "--spp",
          .placeholder = "N",
@@ -32,7 +32,7 @@ OptionGroup what(Job& job) {
              [&job](const std::string& text) { job.target_error = parseFraction(text, "--target-error"); }},
         {.names = "--samples",
          .placeholder = "A:B",
-         .help = "exactly the samples A to B-1: a part to merge with others",
+         .help = "render exactly the samples A to B-1, to merge with other parts later",
          .read = [&job](const std::string& text) { job.samples = parseSampleRange(text, "--samples"); },
          .excludes = {"--spp"}},
     };
@@ -43,11 +43,12 @@ OptionGroup what(Job& job) {
 OptionGroup where(Job& job) {
     const std::vector<std::string> kernels{"lean", "full", "lean-only"};
     return {
-        "Where",
+        "Device",
         {backendOption(job.backend), deviceOption(job.integrator), threadsOption(job.integrator),
          {.names = "--kernel",
           .placeholder = "KIND",
-          .help = "lean: only what the scene needs; full; lean-only: waits for the compiler; same bits",
+          .help = "lean: a kernel for this scene only; full: with all features; lean-only: lean, waiting "
+                  "for the compiler; same bits",
           .read = [&job](const std::string& text) {
               job.integrator.kernel = text == "full"        ? CRT_KERNEL_FULL
                                       : text == "lean-only" ? CRT_KERNEL_LEAN_ONLY
@@ -63,11 +64,11 @@ OptionGroup where(Job& job) {
           }},
          {.names = "--chunk",
           .placeholder = "N",
-          .help = "samples per pixel between two looks at clock and signals",
+          .help = "samples per pixel between checks of the clock and of signals",
           .read = [&job](const std::string& text) { job.chunk = parseCount(text, "--chunk", 1); }},
          {.names = "--no-cache",
           .placeholder = {},
-          .help = "keep no compiled kernels on disk",
+          .help = "do not keep compiled kernels on disk",
           .read = [&job](const std::string&) { job.integrator.use_cache = false; }}}};
 }
 
@@ -82,18 +83,18 @@ OptionGroup files(Job& job) {
              exposeOption(job.expose_automatically),
              {.names = "--checkpoint",
               .placeholder = "FILE",
-              .help = "save the samples at the end and now and then, for --resume; or off",
+              .help = "save the samples regularly and at the end, for --resume; or off",
               .read = [&job](const std::string& text) { job.checkpoint_file = text == "off" ? "" : text; },
               .completion = completeFilm()},
              {.names = "--checkpoint-every",
               .placeholder = "DURATION",
-              .help = "how often (10m)",
+              .help = "interval between checkpoints (10m)",
               .read = [&job](const std::string& text) {
                   job.checkpoint_interval_seconds = parseDuration(text, "--checkpoint-every");
               }},
              {.names = "--resume",
               .placeholder = "[FILE]",
-              .help = "go on from a checkpoint (FILE.crtfilm, or the first output's), and keep it",
+              .help = "continue from a checkpoint (FILE.crtfilm, or the first output's), and keep it",
               .read = [&job](const std::string& text) {
                   job.resume = true;
                   job.resume_file = text == "auto" ? "" : text;
@@ -101,11 +102,11 @@ OptionGroup files(Job& job) {
               .completion = completeFilm()},
              {.names = "--overwrite",
               .placeholder = {},
-              .help = "replace a film even where it holds more samples than this run makes",
+              .help = "replace a film even if it holds more samples than this run makes",
               .read = [&job](const std::string&) { job.overwrite = true; }},
              {.names = "--report",
               .placeholder = "FILE",
-              .help = "what the run did, as JSON (first output with .report.json); or none",
+              .help = "write a JSON report of the run (default: first output with .report.json); or none",
               .read = [&job](const std::string& text) { job.report_file = text == "none" ? "" : text; },
               .completion = completeFile({"json"})}}};
 }
@@ -120,7 +121,7 @@ Command renderCommand() {
     const auto state = std::make_shared<State>();
     Job& job = state->job;
     return {.name = "render",
-            .summary = "render a scene; the word may be left out",
+            .summary = "render a scene; the word 'render' is optional",
             .arguments = {{.name = "SCENE",
                            .help = "scene file (YAML), or - for standard input",
                            .read = [&job](const std::string& text) { job.scene.file = text; },
@@ -143,7 +144,7 @@ Command renderCommand() {
             .notes = programExamples(),
             .run = [state](const std::string& typed) {
                 state->job.command = typed;
-                // In a pipe nobody looks for a report that was not asked for.
+                // A pipe needs no report unless it was requested.
                 const bool streamed =
                     !state->job.outputs.empty() && isStandardOutput(state->job.outputs.front());
                 if (streamed && !state->job.report_file) state->job.report_file = "";

@@ -10,7 +10,7 @@ namespace crt {
 
 unsigned smallCount(const std::string& text, const char* option, std::uint64_t least) {
     const std::uint64_t n = parseCount(text, option, least);
-    if (n > 65536) throw Error(ErrorKind::Usage, fmt::format("{} {} is beyond any use", option, text));
+    if (n > 65536) throw Error(ErrorKind::Usage, fmt::format("{} {} is too large", option, text));
     return static_cast<unsigned>(n);
 }
 
@@ -24,7 +24,7 @@ void addSceneChanges(OptionGroup& group, SceneRequest& scene) {
     group.options.push_back(
         {.names = "--seed",
          .placeholder = "N",
-         .help = "another seed: other, equally good, noise",
+         .help = "seed of the random numbers; a new seed gives statistically equivalent noise",
          .read = [&scene](const std::string& text) { scene.seed = parseCount(text, "--seed", 0); }});
     group.options.push_back(
         {.names = "--crop",
@@ -36,7 +36,7 @@ void addSceneChanges(OptionGroup& group, SceneRequest& scene) {
 Option backendOption(std::string& backend) {
     return {.names = "-b,--backend",
             .placeholder = "NAME",
-            .help = "cuda, embree, opencl, another, a path of one, or auto (CRT_BACKEND)",
+            .help = "cuda, embree, opencl, another name, the path of a backend, or auto (CRT_BACKEND)",
             .read = [&backend](const std::string& text) { backend = text; },
             .completion = {Completion::Kind::Backend},
             .environment = "CRT_BACKEND"};
@@ -62,7 +62,7 @@ Option threadsOption(IntegratorOptions& integrator) {
 Option exposeOption(bool& automatically) {
     return {.names = "--expose",
             .placeholder = "auto",
-            .help = "choose the exposure by the picture: its log-average becomes 18 % grey",
+            .help = "auto: choose the exposure so that the log-average of the image becomes 18 % grey",
             .read = [&automatically](const std::string&) { automatically = true; },
             .completion = completeWord({"auto"}),
             .choices = {"auto"}};

@@ -33,7 +33,7 @@ Option noProgressOption(ProgressMode& progress);
 /// -q: warnings and errors alone.
 Option quietOption(const char* help);
 
-/// What files of scenes, images and films are called.
+/// Extensions of files of scenes, images and films.
 Completion completeScene();
 Completion completeImage();
 Completion completeFilm();

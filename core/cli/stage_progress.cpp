@@ -19,7 +19,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr std::chrono::milliseconds kLook{100};
-constexpr std::chrono::milliseconds kSilence{400};      // What is done sooner needs no line.
+constexpr std::chrono::milliseconds kSilence{400};      // Shorter work needs no line.
 constexpr std::chrono::milliseconds kLogSilence{1500};  // The same for a log, which keeps every line.
 constexpr std::chrono::milliseconds kLogStage{500};     // A stage that a log should name takes longer.
 constexpr std::chrono::seconds kLogInterval{10};

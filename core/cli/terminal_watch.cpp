@@ -20,7 +20,7 @@ void TerminalWatch::renderingEnds() {
     stages_.reset();
     progress_.reset();
     if (!interrupt_ && signals_ != Signals::Never)
-        interrupt_.emplace();  // What is written next must not be cut short.
+        interrupt_.emplace();  // The next output must not be cut short.
 }
 
 void TerminalWatch::progress(const ProgressState& state) {

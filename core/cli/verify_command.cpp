@@ -59,7 +59,7 @@ OptionGroup asked(Request& to) {
           .choices = levels},
          {.names = "--part",
           .placeholder = "I/N",
-          .help = "only every N-th of these cases, from the I-th on: N runs ask them all",
+          .help = "only every N-th of these cases, starting at the I-th: N runs cover all cases",
           .read = {}},
          {.names = "--list", .placeholder = {}, .help = "show the cases and run nothing", .read = {}}},
         to);
@@ -70,7 +70,7 @@ OptionGroup ofWhom(Request& to) {
                     {backendOption(to.backend),
                      {.names = "--plugin-path",
                       .placeholder = "DIR",
-                      .help = "look for the backend here first",
+                      .help = "search for the backend here first",
                       .read = {},
                       .completion = {Completion::Kind::Folder}},
                      deviceOption(to.integrator), threadsOption(to.integrator)},
@@ -81,12 +81,12 @@ OptionGroup output(Request& to) {
     return passedOn("Output",
                     {{.names = "-o,--output",
                       .placeholder = "DIR",
-                      .help = "write verify.json there, and its page, verify.html (by Python)",
+                      .help = "write verify.json and the page verify.html (made by Python) there",
                       .read = {},
                       .completion = {Completion::Kind::Folder}},
                      {.names = "-q,--quiet",
                       .placeholder = {},
-                      .help = "only what fails, and the summary",
+                      .help = "print only failures and the summary",
                       .read = {}},
                      {.names = "--markdown",
                       .placeholder = {},
@@ -94,7 +94,7 @@ OptionGroup output(Request& to) {
                       .read = {}},
                      {.names = "--figures",
                       .placeholder = "FILE",
-                      .help = "with --markdown: a verify.json whose figures go into it; repeatable",
+                      .help = "with --markdown: a verify.json whose numbers to include; repeatable",
                       .read = {},
                       .completion = completeFile({"json"}),
                       .repeatable = true}},
@@ -102,7 +102,7 @@ OptionGroup output(Request& to) {
 }
 
 constexpr const char* kVerifyNotes =
-            "\nThe suite asks a backend what physics, geometry and arithmetic demand: closed forms, "
+            "\nThe suite checks a backend against physics, geometry and arithmetic: closed forms, "
             "deterministic quadrature, relations between\n"
             "images. A case passes, does not apply (and says why), is "
             "INCONCLUSIVE (the noise hides the answer) or\n"
@@ -111,11 +111,11 @@ constexpr const char* kVerifyNotes =
             "\nExamples:\n"
             "  crt verify                                          the level for every commit, on the best "
             "backend\n"
-            "  crt verify --backend opencl --level merge -o out    minutes of it, with out/verify.json and "
+            "  crt verify --backend opencl --level merge -o out    a few minutes, with out/verify.json and "
             "out/verify.html\n"
             "  crt verify --case furnace,A03,H                     two cases and a whole group\n"
             "  crt verify --backend mine --plugin-path build       a backend of your own\n"
-            "  crt verify --list --level nightly                   everything there is\n";
+            "  crt verify --list --level nightly                   all cases\n";
 
 
 constexpr const char* kSuite = "crt_conformance";
@@ -143,7 +143,7 @@ constexpr const char* kSuite = "crt_conformance";
 Command verifyCommand() {
     const auto to = std::make_shared<Request>();
     return {.name = "verify",
-            .summary = "render scenes whose answer is known; exit code 7 when a backend does not find it",
+            .summary = "render scenes with known results; exit code 7 if a backend does not reproduce them",
             .groups = {asked(*to), ofWhom(*to), output(*to)},
             .notes = kVerifyNotes,
             .run = [to](const std::string&) -> int { becomeSuite(to->words); }};

@@ -21,7 +21,8 @@ struct ViewArguments {
 std::uint16_t parsePort(const std::string& text) {
     const std::uint64_t port = parseCount(text, "--port", 0);
     if (port > 65535)
-        throw Error(ErrorKind::Usage, fmt::format("--port {} is above 65535, the last one", text));
+        throw Error(ErrorKind::Usage, fmt::format("--port {} is too large: the largest port is 65535",
+                                                  text));
     return static_cast<std::uint16_t>(port);
 }
 
@@ -34,15 +35,15 @@ std::string parseToken(const std::string& text) {
 }
 
 constexpr const char* kViewNotes =
-    "\nThe page shows the image as it converges. Dragging turns the camera around its target, with Shift or "
-    "the right button it is\n"
-    "moved, the wheel goes nearer and farther; a click shows what the film knows of a pixel, and Ctrl with "
-    "a "
-    "click focuses a lens.\n"
-    "The scene is read again whenever a file that it is made of changes. The address holds a secret: who "
-    "knows it, can see the\n"
-    "image and change the view. From elsewhere: ssh -L 8080:127.0.0.1:8080 HOST, and there crt view --port "
-    "8080.\n"
+    "\nThe page shows the image as it converges. Drag to turn the camera around its target, or with Shift "
+    "or "
+    "the right button to move it;\n"
+    "the wheel changes the distance. A click shows the data of a pixel, and Ctrl with a click focuses a "
+    "lens.\n"
+    "crt reads the scene again whenever one of its files changes. The address contains a secret: everyone "
+    "who has it can see the\n"
+    "image and change the view. For remote access: ssh -L 8080:127.0.0.1:8080 HOST, and there crt view "
+    "--port 8080.\n"
     "\nExamples:\n"
     "  crt view scene.yaml                           opens a browser, or prints the address\n"
     "  crt view scene.yaml --set film.resolution=[640,360] --spp 4096\n"
@@ -50,7 +51,7 @@ constexpr const char* kViewNotes =
     "  crt view scene.yaml --tev localhost:14158     in the viewer tev as well\n";
 
 OptionGroup what(ViewArguments& to) {
-    OptionGroup group{"What is shown"};
+    OptionGroup group{"Scene"};
     group.options = {
         {.names = "--spp",
          .placeholder = "N",
@@ -61,22 +62,22 @@ OptionGroup what(ViewArguments& to) {
 }
 
 OptionGroup where(ViewArguments& to) {
-    return {"Where",
+    return {"Device and address",
             {backendOption(to.view.backend),
              deviceOption(to.view.integrator),
              threadsOption(to.view.integrator),
              {.names = "--port",
               .placeholder = "N",
-              .help = "of 127.0.0.1, where the page is (a free one)",
+              .help = "port of 127.0.0.1 for the page (a free one)",
               .read = [&to](const std::string& text) { to.serve.port = parsePort(text); }},
              {.names = "--token",
               .placeholder = "SECRET",
-              .help = "in the address, instead of a random one (CRT_VIEW_TOKEN)",
+              .help = "secret in the address, instead of a random one (CRT_VIEW_TOKEN)",
               .read = [&to](const std::string& text) { to.serve.token = parseToken(text); },
               .environment = "CRT_VIEW_TOKEN"},
              {.names = "--no-open",
               .placeholder = {},
-              .help = "open no browser",
+              .help = "do not open a browser",
               .read = [&to](const std::string&) { to.serve.open_browser = false; }},
              {.names = "--tev",
               .placeholder = "HOST:PORT",
@@ -96,11 +97,11 @@ Command viewCommand() {
                            .completion = completeScene()}},
             .groups = {what(*to),
                        where(*to),
-                       {"Messages", {quietOption("only the address, warnings and errors")}}},
+                       {"Messages", {quietOption("print only the address, warnings and errors")}}},
             .notes = kViewNotes,
             .run = [to](const std::string&) {
                 if (to->view.scene.file == "-")
-                    throw Error(ErrorKind::Usage, "crt view reads its scene again and again: name a file");
+                    throw Error(ErrorKind::Usage, "crt view reads its scene repeatedly: name a file");
                 serveView(to->view, to->serve);
                 return 0;
             }};

@@ -22,7 +22,7 @@ struct State {
     IntegratorOptions integrator{};
 };
 
-/// How the backend came by its kernels.
+/// Origin of the backend's kernels.
 std::string kernelText(const CrtBackendReport& report) {
     if (report.kernel_from_cache != 0) return "from the cache";
     if (report.compile_seconds > 0) return fmt::format("compiled in {:.1f} s", report.compile_seconds);
@@ -68,12 +68,15 @@ OptionGroup options(State& state) {
 }
 
 constexpr const char* kWarmNotes =
-            "\nA backend compiles a kernel for what a scene needs, and keeps it on disk: in CRT_CACHE_DIR, "
-            "else in crt of XDG_CACHE_HOME or of ~/.cache. The first render of a kind of scene waits for "
-            "the compiler, or begins with a slower kernel. This command compiles now, so that no render "
-            "has to: after an installation, or before a job that many machines begin at once.\n"
-            "Kernels depend on the kinds of things in a scene, on its AOVs and on the device, and neither "
-            "on values nor on the size of the image.\n"
+            "\nA backend compiles a kernel for the features of a scene, and keeps it on disk: in "
+            "CRT_CACHE_DIR, or in the folder crt of XDG_CACHE_HOME or of ~/.cache. The first render with "
+            "new "
+            "features waits for the compiler, or begins with a slower kernel. This command compiles now, so "
+            "that no render has to wait: after an installation, or before a job that many machines begin at "
+            "the same time.\n"
+            "Kernels depend on the features of a scene, on its AOVs and on the device, and neither on "
+            "values "
+            "nor on the size of the image.\n"
             "\nExamples:\n"
             "  crt warm scene.yaml\n"
             "  crt warm -b opencl configs/*.yaml\n";

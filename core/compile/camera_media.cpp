@@ -189,7 +189,7 @@ void findCameraMedia(unsigned char* blob) {
     scene.camera_media = most->first;
     if (most->second < static_cast<int>(kDirections.size()))
         logWarning(
-            "rays in {} of {} directions find other bodies of glass around the camera than the rest do: a "
+            "rays in {} of {} directions find different glass bodies around the camera: a "
             "body "
             "is not closed, or several overlap there; the camera may see too much absorbed, or too little",
             static_cast<int>(kDirections.size()) - most->second, kDirections.size());

@@ -81,10 +81,10 @@ std::size_t expectedBytes(const FlatScene& flat, const AcceleratorPart& accelera
 void warnOfUnseenLights(const Scene& scene, const kernel::CrtScene& header) {
     if (header.point_lights.count == 0 || (header.features & CRT_FEATURE_POINT_LIGHT) != 0) return;
     logWarning(
-        "{}: nothing scatters their light: surfaces that are mirrors, smooth metals and glass do not "
-        "show point, spot and directional lights{}",
+        "{}: nothing scatters their light: mirrors, smooth metals and glass do not show point, spot and "
+        "directional lights{}",
         scene.file,
-        scene.integrator.max_depth == 0 ? ", and 'max_depth: 0' shows no light on anything" : "");
+        scene.integrator.max_depth == 0 ? ", and 'max_depth: 0' shows no illuminated surfaces" : "");
 }
 
 /// From part to part: each function takes parts of the scene, or what was made of them, and returns a part
@@ -257,16 +257,15 @@ void warnOfNearSurfaces(const Scene& scene, const CompiledScene& compiled) {
     if (const std::optional<CoplanarLight> found = findCoplanarLight(searched))
         logWarning(
             "{} lies in the plane of {} and overlaps it: rounding decides which of them is seen, and the "
-            "image is wrong there; move the lamp {:.3g} "
+            "image is wrong there; move the light {:.3g} "
             "or more towards the side that it lights, or cut a hole for it",
             objectOf(scene, compiled, found->light), objectOf(scene, compiled, found->surface),
             found->least_gap);
     if (const CoarseLights found = findCoarseLights(compiled); found.lights > 0)
         logWarning(
             "{} of {} lights are so small, and so far from where the camera is and looks, that rounding "
-            "moves "
-            "their edges by up to {:.1g} of their size: their light is wrong by as much; use point lights "
-            "for them, or leave out what makes the scene so large",
+            "moves their edges by up to {:.1g} of their size: their light is wrong by the same factor; use "
+            "point lights for them, or remove the distant objects",
             found.lights, found.asked, found.rounding);
     if (scene.integrator.max_depth > 0)
         if (const NearSurfaces found = findNearSurfaces(searched); found.near > 0)

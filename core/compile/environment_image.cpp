@@ -87,8 +87,8 @@ auto readAt(const SourcePlace& place, const Read& read) {
 /// Codes of 8 and 16 bits end at the white of a screen, and the sun is brighter by factors of ten thousands.
 void warnOfCodes(const EnvironmentImage& image, const TexelsInfo& info) {
     if (info.type == TexelType::Float) return;
-    logWarning("{}: '{}' has {} bits a colour, which end at white: it holds neither the sun nor lamps, and "
-               "shadows will be faint; take an EXR, HDR or PFM file",
+    logWarning("{}: '{}' has {} bits per colour, which cannot hold values above white such as the sun or "
+               "lamps: shadows will be faint; use an EXR, HDR or PFM file",
                image.place.text(), image.file, info.type == TexelType::Uint8 ? 8 : 16);
 }
 

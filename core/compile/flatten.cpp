@@ -119,7 +119,8 @@ private:
         forEachPart([this](Part& part) { describe(part); });
         for (const Part& part : parts_)
             if (part.infinite)
-                throw Error(ErrorKind::Scene, "a transform moves a vertex to infinity",
+                throw Error(ErrorKind::Scene, "a transform moves a vertex beyond the range of single "
+                                              "precision",
                             part.infinite->object->place);
         measure(flat_, boundsOfParts());
         for (const Part& part : parts_) flat_.smooth_triangles += part.smooth;
@@ -319,16 +320,16 @@ FlatScene flattenScene(const Scene& scene) {
         count += copies * scene.meshes[object.mesh].triangles.size() + instances;
         ids += trianglesOf(scene, object) + places;
         if (object.sharing == Sharing::Always && places > 1 && emits(scene, object))
-            logWarning("{}: surfaces that emit do not share their mesh; it is written out {} times",
+            logWarning("{}: emitting surfaces cannot share a mesh; it is duplicated {} times",
                        object.name, places);
     }
     if (ids >= std::numeric_limits<std::uint32_t>::max())
         throw Error(ErrorKind::Scene,
-                    fmt::format("the scene shows {} triangles; crt numbers up to 4295 million", ids));
+                    fmt::format("the scene has {} triangles; crt supports up to 4295 million", ids));
     if (count >= kMostTriangles)
         throw Error(
             ErrorKind::Scene,
-            fmt::format("written out, the scene has {} triangles; crt renders up to 268 million", count));
+            fmt::format("expanded, the scene has {} triangles; crt renders up to 268 million", count));
     if (scene.input_bytes > 0)
         if (const std::string why =
                 ExpansionLimit(scene.input_bytes).refusal(count, "triangles", kBytesPerTriangle);

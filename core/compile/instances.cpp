@@ -123,7 +123,8 @@ PlacedMesh placedMesh(const Object& object, const Matrix4d& transform, const Ins
     for (const Vec3d& corner : box)
         for (std::size_t k = 0; k < 3; ++k)
             if (!std::isfinite(corner[k]))
-                throw Error(ErrorKind::Scene, "a transform moves a vertex to infinity", object.place);
+                throw Error(ErrorKind::Scene, "a transform moves a vertex beyond the range of single "
+                                              "precision", object.place);
     return {&object, transform, mesh_number, number, box[0], box[1]};
 }
 

@@ -215,8 +215,8 @@ void numberMedia(const std::vector<const Material*>& materials, SpectrumTable& s
     }
     if (part.media.size() >= std::size_t{1} << 16)
         throw Error(ErrorKind::Scene,
-                    fmt::format("{} materials of glass absorb differently or have holes; crt tells up to "
-                                "65535 apart",
+                    fmt::format("{} glass materials absorb differently or have holes; crt supports up to "
+                                "65535",
                                 part.media.size()));
     part.features |= CRT_FEATURE_MEDIA;
 }

@@ -157,7 +157,7 @@ CompiledScene nearScene(const CompiledScene& scene) {
     std::vector<TriangleBounds> bounds;
     bounds.reserve(near.size());
     for (const std::uint32_t slot : near) bounds.push_back(boundsOf(triangles[slot], 0));
-    logDebug("{} of {} triangles lie where surfaces are asked for neighbours", near.size(), scene.triangles);
+    logDebug("{} of {} triangles are checked for near surfaces", near.size(), scene.triangles);
     Bvh bvh;
     if (near.empty())  // all are instances: there is nothing to make a tree of
         header.accelerator = CRT_ACCELERATOR_BRUTE_FORCE;

@@ -80,12 +80,12 @@ LeftOut leftOut(const Scene& scene, const kernel::CrtScene& header, std::size_t 
                                           header.triangle_count,
                                           header.shapes.count > 0 ? "triangles and shapes" : "triangles",
                                           kBruteForceTriangles)
-                            : std::string("integrator.accelerator asks for another"));
-    if (without_nodes) left_out("BVH", "the backend builds an acceleration structure of its own");
+                            : std::string("integrator.accelerator selects another structure"));
+    if (without_nodes) left_out("BVH", "the backend builds its own acceleration structure");
     const std::size_t triangles = header.triangle_count - header.shapes.count - header.instances.count;
     if (has(CRT_FEATURE_NEE) && has(CRT_FEATURE_BRUTE_FORCE) && occluders < triangles)
         left_out("shadow tests",
-                 fmt::format("{} of {} triangles have the whole scene on one side and cannot come between",
+                 fmt::format("{} of {} triangles have the whole scene on one side and cannot block light",
                              triangles - occluders, triangles));
 #define CRT_LEFT_OUT_MATERIAL(F, bit, NAME, Name, word, scatter, text) \
     if (!has(CRT_FEATURE_##NAME)) left_out(text, "no surface uses it");
@@ -103,7 +103,7 @@ LeftOut leftOut(const Scene& scene, const kernel::CrtScene& header, std::size_t 
     if (!has(CRT_FEATURE_CLEARCOAT)) left_out("coats", "no surface has one on top");
     if (!has(CRT_FEATURE_FUZZ)) left_out("fuzz", "no surface has any");
     if (!has(CRT_FEATURE_ROUGH_BASE)) left_out("rough diffuse bases", "all are Lambert's");
-    if (!has(CRT_FEATURE_ANISOTROPY)) left_out("anisotropy", "all surfaces are as rough in every direction");
+    if (!has(CRT_FEATURE_ANISOTROPY)) left_out("anisotropy", "all surfaces are isotropic");
     if (!has(CRT_FEATURE_SHAPES)) left_out("spheres, disks and cylinders", "all surfaces are triangles");
     if (!has(CRT_FEATURE_INSTANCES)) left_out("instances", "every triangle is stored where it stands");
     if (!has(CRT_FEATURE_SMOOTH_NORMALS)) left_out("shading normals", "all faces are flat");
@@ -118,11 +118,11 @@ LeftOut leftOut(const Scene& scene, const kernel::CrtScene& header, std::size_t 
     if (has(CRT_FEATURE_ENVIRONMENT) && !has(CRT_FEATURE_ENVIRONMENT_LIGHT))
         left_out("light sampling of the environment",
                  header.environment_light == 0 ? "environment.light_sampling is false"
-                                               : "nothing that light sampling could light");
+                                               : "no surface needs light sampling");
     if (!has(CRT_FEATURE_POINT_LIGHT))
         left_out("lights without a surface",
                  header.point_lights.count == 0 ? "there are none"
-                                                : "nothing that light sampling could light");
+                                                : "no surface needs light sampling");
     if (!has(CRT_FEATURE_LIGHT_TREE))
         left_out("a tree of lights", fmt::format("fewer than {} lights lie at a place", kLightTreeLights));
     if (!has(CRT_FEATURE_LENS)) left_out("thin lens", "the camera is a pinhole");
@@ -137,7 +137,7 @@ LeftOut leftOut(const Scene& scene, const kernel::CrtScene& header, std::size_t 
     for (const auto& [feature, name] : {std::pair{CRT_FEATURE_SOBOL, "Sobol sampler"},
                                         std::pair{CRT_FEATURE_INDEPENDENT, "independent sampler"},
                                         std::pair{CRT_FEATURE_XORSHIFT, "xorshift sampler"}})
-        if (!has(feature)) left_out(name, "sampler.type is another");
+        if (!has(feature)) left_out(name, "sampler.type differs");
     return all;
 }
 

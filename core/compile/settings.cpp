@@ -53,8 +53,8 @@ void requireDepths(const Scene& scene, const kernel::CrtScene& header) {
     const double farthest = reach * static_cast<double>(header.depth_scale);
     if (!(farthest < static_cast<double>(std::numeric_limits<float>::max())))
         throw Error(ErrorKind::Scene,
-                    "the scene is too large for its distances in single precision: scale it down, or "
-                    "leave 'depth' out of 'aovs'",
+                    "distances in the scene are too large for single precision: scale the scene down, or "
+                    "remove 'depth' from 'aovs'",
                     scene.camera.place);
 }
 
@@ -96,7 +96,7 @@ kernel::CrtCamera cameraOf(const Scene& scene, const Vec3d& centre, int scale_ex
         throw Error(ErrorKind::Scene, "the camera's aperture is too large for single precision",
                     camera.place);
     if (camera.aperture_radius > 0 && !(focus * scale <= kFarthest))
-        throw Error(ErrorKind::Scene, "the camera is focused too far off for single precision",
+        throw Error(ErrorKind::Scene, "the focus distance of the camera is too large for single precision",
                     camera.place);
     c.lens_radius = static_cast<float>(camera.aperture_radius * scale);
     c.focus_distance = static_cast<float>(focus * scale);

@@ -53,7 +53,8 @@ PlacedShape placed(const Object& object, const Matrix4d& m, std::uint32_t placem
         p.lower[k] = p.centre[k] + reach.lower;
         p.upper[k] = p.centre[k] + reach.upper;
         if (!std::isfinite(p.lower[k]) || !std::isfinite(p.upper[k]) || !std::isfinite(p.centre[k]))
-            throw Error(ErrorKind::Scene, "a transform moves a shape to infinity", object.place);
+            throw Error(ErrorKind::Scene, "a transform moves a shape beyond the range of single precision",
+                                          object.place);
     }
     return p;
 }

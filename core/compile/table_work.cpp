@@ -47,7 +47,7 @@ void TableWork::requireBounded() const {
     if (seconds() <= most) return;
     throw Error(ErrorKind::Scene,
                 fmt::format("{}: error: the scene has {} rough materials that differ in roughness, index or "
-                            "anisotropy; their tables take {} of a processor, and a scene may take {}; give "
+                            "anisotropy; their tables take {} of processor time, and the limit is {}; give "
                             "materials the same values, or set CRT_TABLE_SECONDS={:.0f} to allow it",
                             at(last_->place), tables_, durationText(seconds()), durationText(most),
                             std::ceil(seconds())),

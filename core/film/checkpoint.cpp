@@ -118,7 +118,7 @@ std::uint64_t tailBytes(const Header& h) {
 /// Size of the part before the film.
 Wide headBytes(const Header& h) { return Wide{tailBytes(h)} + sizeof(Header); }
 
-/// Whether the header can describe a file of its size.
+/// True if the header can describe a file of its size.
 bool sizesFit(const Header& h) {
     if (h.header_bytes != headBytes(h)) return false;
     if (h.format_version > kCheckpointVersionUnpacked)
@@ -136,10 +136,10 @@ FilmRecord readRecordOf(const std::string& path, const std::vector<unsigned char
         const auto& [x0, y0, x1, y1] = record.window;
         if (static_cast<std::uint32_t>(x1 - x0) != h.width ||
             static_cast<std::uint32_t>(y1 - y0) != h.height)
-            throw Error(ErrorKind::Usage, "is of a film of another size");
+            throw Error(ErrorKind::Usage, "belongs to a film of another size");
         return record;
     } catch (const Error& error) {
-        refuse(path, fmt::format("holds a record of its scene that {}", error.what()));
+        refuse(path, fmt::format("holds a scene record that {}", error.what()));
     }
 }
 
@@ -200,13 +200,13 @@ std::pair<Film, FilmIdentity> readCheckpoint(const std::string& path) {
     readExactly(file.get(), path, &header, std::min<std::uint64_t>(actual_bytes, sizeof header));
     if (std::memcmp(header.magic.data(), kMagic.data(),
                     std::min<std::uint64_t>(actual_bytes, kMagic.size())) != 0)
-        refuse(path, "is not a crt film: it does not begin with the mark of one");
+        refuse(path, "is not a crt film: its first bytes differ");
     if (actual_bytes >= 12 && header.format_version != kCheckpointVersion &&
         header.format_version != kCheckpointVersionUnpacked)
         refuse(path, fmt::format("is a crt film of format {}; this crt reads formats {} and {}",
                                  header.format_version, kCheckpointVersionUnpacked, kCheckpointVersion));
     if (actual_bytes < sizeof header)
-        refuse(path, fmt::format("is truncated: it has {} bytes and its header alone takes {}", actual_bytes,
+        refuse(path, fmt::format("is truncated: it has {} bytes and its header needs {}", actual_bytes,
                                  sizeof header));
     // Sizes before anything is allocated: a damaged width must not ask for a terabyte.
     if (actual_bytes < header.file_bytes)
@@ -217,7 +217,8 @@ std::pair<Film, FilmIdentity> readCheckpoint(const std::string& path) {
     // A side of no pixels makes any other side fit the size; walking four thousand million empty rows would
     // take a minute.
     if (std::min(header.width, header.height) < 1 || std::max(header.width, header.height) > kFilmSideMax)
-        refuse(path, fmt::format("is damaged: its header says {} x {} pixels, and films have 1 to {} a side",
+        refuse(path, fmt::format("is damaged: its header states {} x {} pixels, and films have 1 to {} per "
+                                 "side",
                                  header.width, header.height, kFilmSideMax));
 
     const char* const kBadChecksum = "is damaged: its checksum does not match its content";
@@ -277,7 +278,7 @@ std::pair<Film, FilmIdentity> readCheckpoint(const std::string& path) {
         header.bits_version};
     identity.record = std::move(record);
     if (!isHexHash(identity.scene_hash.data(), identity.scene_hash.size()))
-        refuse(path, "holds a scene hash that is not one");
+        refuse(path, "holds an invalid scene hash");
     try {
         for (std::uint32_t i = 0; i < header.range_count; ++i) {
             SampleRange range;
@@ -293,7 +294,7 @@ std::pair<Film, FilmIdentity> readCheckpoint(const std::string& path) {
 
 namespace {
 
-/// What `found` has and `expected` has not, in words.
+/// The traits that `found` has and `expected` lacks, in words.
 std::string differenceText(const FilmIdentity& found, const FilmIdentity& expected) {
     std::vector<std::string> differences;
     if (found.record && expected.record) differences = differingTraits(*found.record, *expected.record);
@@ -308,10 +309,11 @@ void requireSameScene(const std::string& path, const FilmIdentity& found, const 
     // Before the hash, which covers the version too and could not say what differs.
     if (found.bits_version != expected.bits_version)
         refuse(path, fmt::format("holds samples of bits version {}, rendered by crt {}, and version {} is "
-                                 "expected: samples of two versions do not make one image; render it anew",
+                                 "expected: samples of two versions cannot be combined; render it again",
                                  found.bits_version, found.version, expected.bits_version));
     if (found.scene_hash != expected.scene_hash)
-        refuse(path, fmt::format("is of another scene, seed or film: {}", differenceText(found, expected)));
+        refuse(path, fmt::format("belongs to another scene, seed or film: {}",
+                                 differenceText(found, expected)));
     if (found.version != expected.version)
         logWarning("'{}' was rendered by crt {}, this is {}: samples may differ between versions", path,
                    found.version, expected.version);
@@ -352,13 +354,13 @@ void mergeFilm(std::pair<Film, FilmIdentity>& merged, const std::string& merged_
     if (identity.bits_version != sum_identity.bits_version)
         throw Error(
             ErrorKind::Usage,
-            fmt::format("'{}' and '{}' hold samples of bits versions {} and {}, which do not make one "
-                        "image: render one of them anew",
+            fmt::format("'{}' and '{}' hold samples of bits versions {} and {}, which cannot be combined: "
+                        "render one of them again",
                         merged_name, name, sum_identity.bits_version, identity.bits_version),
             {name});
     if (identity.scene_hash != sum_identity.scene_hash)
         throw Error(ErrorKind::Usage,
-                    fmt::format("'{}' is of another scene, seed or film than '{}': {}", name, merged_name,
+                    fmt::format("'{}' and '{}' differ in scene, seed or film: {}", name, merged_name,
                                 differenceText(identity, sum_identity)),
                     {name});
     requireSameScene(name, identity, sum_identity);

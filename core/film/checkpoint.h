@@ -60,7 +60,7 @@ inline constexpr const char* kCheckpointExtension = ".crtfilm";
 void requireSameScene(const std::string& path, const FilmIdentity& found, const FilmIdentity& expected);
 
 /// "1.0.0 and 1.1.0": every version that is in `a` or in `b`, once, in the order of their text, whatever the
-/// order of films. What a checkpoint has no room for is "and more".
+/// order of films. "and more" stands for entries that do not fit into a checkpoint.
 std::string joinVersions(const std::string& a, const std::string& b);
 
 /// Adds the film `name` to `merged`, a film of the same scene and bits. Throws as mergeCheckpoints, and then

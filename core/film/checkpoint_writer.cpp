@@ -10,7 +10,7 @@
 namespace crt {
 namespace {
 
-/// What went wrong, if anything did.
+/// The error, if any.
 std::optional<Error> tryTo(const CheckpointWriter::Write& write, const Film& film,
                            const FilmIdentity& identity) {
     try {
@@ -53,7 +53,7 @@ void CheckpointWriter::save(const Film& film, FilmIdentity identity) {
 void CheckpointWriter::finish() {
     if (!writing_.valid()) return;
     if (const std::optional<Error> failure = writing_.get())
-        logWarning("{}; rendering goes on, and so do the attempts", failure->what());
+        logWarning("{}; rendering continues, and crt tries again at the next checkpoint", failure->what());
 }
 
 }  // namespace crt

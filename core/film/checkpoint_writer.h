@@ -25,14 +25,14 @@ public:
     CheckpointWriter(const CheckpointWriter&) = delete;
     CheckpointWriter& operator=(const CheckpointWriter&) = delete;
 
-    /// Whether the last copy is written, so that save() need not wait for it.
+    /// True if the last copy is written, so that save() need not wait for it.
     bool idle() const;
     /// Takes a copy of the film and writes it on another thread. If there is no memory for the copy or no
     /// thread, writes the film before it returns. Warns if the previous copy could not be written; rendering
     /// continues.
     void save(const Film& film, FilmIdentity identity);
-    /// Waits for the copy that is being written, and warns when that fails. Whoever writes the same file
-    /// next calls this first: otherwise the older film could end up in it.
+    /// Waits for the copy that is being written, and warns when that fails. To be called before anything
+    /// else writes the same file: otherwise the older film could end up in it.
     void finish();
 
 private:

@@ -23,8 +23,8 @@ constexpr double kLeastDegreesOfFreedom = 2;
 /// as many fewer.
 constexpr double kUnmet = 3;
 
-/// What the brightest pixel says of pixels as bright that no path has met yet: so many more squares like its
-/// own.
+/// Allowance for pixels as bright as the brightest one that no path has met yet: this number of additional
+/// squares like its own.
 constexpr double kUnseen = 0.5;
 
 /// E[Y⁴]/E[Y²]² is at least E[Y²]/E[Y]² for any distribution of Y ≥ 0 (Lyapunov's inequality), with
@@ -32,11 +32,11 @@ constexpr double kUnseen = 0.5;
 /// 3.9 times that for the tail y^-1/2 of a glossy lobe around a light.
 constexpr double kKurtosis = 4;
 
-/// From so many pixels on the scatter of variances is measured; of fewer, where a measurement would be
-/// noise, replicates are taken as normal.
+/// With at least this number of pixels the scatter of variances is measured; with fewer, where a measurement
+/// would be noise, replicates are taken as normal.
 constexpr double kPixelsToMeasure = 32;
 
-/// Whether the variance between replicates is that of the film's mean: all have samples, and about equally
+/// True if the variance between replicates is that of the film's mean: all have samples, and about equally
 /// many.
 bool balanced(const Film& film) {
     std::uint64_t least = std::numeric_limits<std::uint64_t>::max(), most = 0;
@@ -51,7 +51,7 @@ bool belongs(std::uint32_t x, std::uint32_t y, PixelSet which) {
     return which == PixelSet::All || ((x + y) % 2 == 0) == (which == PixelSet::Even);
 }
 
-/// What parallelFor() gives out at a time.
+/// Size of the parts that parallelFor() hands out.
 constexpr std::size_t kRows = 16;
 
 /// The sum of `add(sum, x, y)` over all pixels: rows by any thread, put together in their order.
@@ -85,7 +85,7 @@ public:
         });
     }
     double at(std::uint32_t x, std::uint32_t y) const { return values_[std::size_t{y} * width_ + x]; }
-    /// Of what is known; 0 when nothing is.
+    /// Of the known values; 0 if there are none.
     double largest() const {
         double largest = 0;
         for (const double value : values_)
@@ -157,7 +157,7 @@ double measuredSpread(const Film& film, const LuminanceVariance& variance, const
     if (variance.fromReplicates() && variance.degreesOfFreedom() >= 3)
         return total(
             [&](std::uint32_t x, std::uint32_t y) { return variance.varianceOfVariance(x, y, largest); });
-    // What a pixel adds to log(√S/M): where a bright path raises both S and M, they partly cancel.
+    // Contribution of a pixel to log(√S/M): if a bright path raises both S and M, they partly cancel.
     const PixelMap influence(film, [&](std::uint32_t x, std::uint32_t y) {
         return 0.5 * variances.at(x, y) / sums.sum - film.mean(x, y, 1) / luminance;
     });
@@ -187,7 +187,7 @@ double noisiestPath(const Film& film, const LuminanceVariance& variance, const P
     return most;
 }
 
-/// Whether paths that the pixels of the set have not met yet may make their error larger than it seems.
+/// True if paths that the pixels of the set have not met yet may make their error larger than it seems.
 bool missesBrightPaths(const Film& film, const PixelMap& variances, PixelSet which, const VarianceSums& sums,
                        double unit, double degrees_of_freedom) {
     std::vector<NoisyPixel> noisy;
@@ -231,7 +231,7 @@ double LuminanceVariance::operator()(std::uint32_t x, std::uint32_t y) const {
     const std::uint64_t n = film_.counts[std::size_t{y} * film_.shape().width + x];
     if (from_replicates_)
         return n == film_.samples.count() ? betweenReplicates(x, y)
-                                          : kUnknown;  // Whose samples were dropped is not known.
+                                          : kUnknown;  // The pixels whose samples were dropped are unknown.
     if (n < 2) return kUnknown;
     const double mean = film_.mean(x, y, 1);
     // Rounding can push the difference of nearly equal numbers below zero.
@@ -294,7 +294,7 @@ std::optional<ErrorEstimate> estimateError(const Film& film, PixelSet which, con
                                       (d < 3 ? kUnseen * sums.most * sums.most : 0));
     e.degrees_of_freedom = std::clamp(2 * sums.sum * sums.sum / spread, 1.0, d * sums.known);
     const bool too_few = e.degrees_of_freedom < std::min(kLeastDegreesOfFreedom, d * sums.known);
-    // One path as bright as the scene's brightest adds so much to the sum of variances.
+    // One path as bright as the scene's brightest adds this amount to the sum of variances.
     const double brightest = paths.brightest.luminance / static_cast<double>(film.samples.count()),
                  of_brightest = brightest * brightest;
     const bool met_brightest = total >= kUnmet * of_brightest;

@@ -1,5 +1,5 @@
-/// What a film knows of its own error, without a reference: the spread between its replicates (layout.h:
-/// CRT_REPLICATES_MAX), which is unbiased for any sampler; or, where there are none, the spread between
+/// Estimates the error of a film without a reference: from the spread between its replicates (layout.h:
+/// CRT_REPLICATES_MAX), which is unbiased for any sampler; or, without replicates, from the spread between
 /// samples, unbiased for independent ones and an upper bound for a Sobol sequence. All of it is about
 /// luminance Y. None of it sees a bias that all samples share.
 #pragma once
@@ -13,8 +13,8 @@
 
 namespace crt {
 
-/// Which pixels are asked. Those of one colour of a checkerboard are independent of those of the other: what
-/// the even ones decide, the odd ones judge.
+/// The pixels of the estimate. Those of one colour of a checkerboard are independent of those of the other:
+/// what the even ones decide, the odd ones judge.
 enum class PixelSet { All, Even, Odd };
 
 /// Variance of the pixels' means of Y.
@@ -26,7 +26,7 @@ public:
     double operator()(std::uint32_t x, std::uint32_t y) const;
     /// Degrees of freedom of one pixel's estimate.
     double degreesOfFreedom() const { return dof_; }
-    /// Whether it is the spread between replicates; else between samples.
+    /// True if it is the spread between replicates, false if between samples.
     bool fromReplicates() const { return from_replicates_; }
     /// Variance of operator() itself, over unit² so that nothing overflows, by unbiased k-statistics:
     /// whatever the distribution of replicates. Needs four.
@@ -44,7 +44,7 @@ private:
     double dof_ = 0;
 };
 
-/// What is known of an error.
+/// The estimate of an error.
 enum class ErrorKnowledge {
     Known,   ///< Estimated, with an interval.
     Bound,   ///< Of one Sobol sequence: the true error is smaller, by an unknown factor.
@@ -53,8 +53,8 @@ enum class ErrorKnowledge {
              ///< trusted.
 };
 
-/// Relative to the image's mean luminance. Pixels are independent of each other, each with a scramble of its
-/// own.
+/// Relative to the image's mean luminance. Pixels are independent of each other, each with a separate
+/// scramble.
 struct ErrorEstimate {
     ErrorKnowledge knowledge = ErrorKnowledge::Bound;
     double mean_luminance = 0;

@@ -12,8 +12,8 @@ namespace {
 
 constexpr std::size_t kNoisiest = 256, kTail = 10;
 
-/// One path carries a pixel whose standard error is at least so much of what the pixel has more or less than
-/// those about it. Exactly 1 for one path on a background without noise.
+/// A pixel is carried by one path if its standard error is at least this share of its difference from the
+/// pixels around it. Exactly 1 for one path on a background without noise.
 constexpr double kOnePath = 0.5;
 
 /// Of the largest variance: below it a difference between replicates is rounding.

@@ -30,7 +30,7 @@ struct ErrorTail {
 /// Looks at the 256 noisiest of `pixels` at most, and reorders them.
 ErrorTail errorTail(const Film& film, std::span<NoisyPixel> pixels);
 
-/// Whether paths that no sample has met yet may make the error larger than an estimate with
+/// True if paths that no sample has met yet may make the error larger than an estimate with
 /// `degrees_of_freedom` from `paths` paths.
 bool tailIsOpen(const ErrorTail& tail, double degrees_of_freedom, double paths);
 

@@ -34,7 +34,7 @@ std::string expectedErrorText(const ErrorEstimate& error, bool light_is_missing)
 std::string errorText(const ErrorEstimate& error, bool light_is_missing) {
     std::string text = expectedText(error);
     if (error.known())
-        text += fmt::format(" expected, of this image at most {}", percentText(error.half_width_95));
+        text += fmt::format(" expected; this image: at most {}", percentText(error.half_width_95));
     return withMissingLight(std::move(text), light_is_missing);
 }
 

@@ -1,4 +1,4 @@
-/// What an image knows of its error, as text.
+/// The error estimate of an image, as text.
 #pragma once
 
 #include "film/error_estimate.h"
@@ -12,7 +12,7 @@ namespace crt {
 /// bytes are columns. "... + missing light" where the image lacks light that no error contains
 /// (scene/missing_light.h).
 std::string expectedErrorText(const ErrorEstimate& error, bool light_is_missing = false);
-/// "error 1.90 % (1.86-1.94) expected, of this image at most 1.95 %": also the 95 % half-width, where it is
+/// "error 1.90 % (1.86-1.94) expected; this image: at most 1.95 %": also the 95 % half-width, where it is
 /// known.
 std::string errorText(const ErrorEstimate& error, bool light_is_missing = false);
 /// "1200-3400": an interval of numbers of samples, two digits each.

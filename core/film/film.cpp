@@ -71,8 +71,8 @@ void SampleRanges::add(SampleRange range) {
     const auto before = next == ranges_.begin() ? ranges_.end() : std::prev(next);
     if (before != ranges_.end() && before->second > range.first)
         throw Error(ErrorKind::Usage,
-                    fmt::format("samples {} overlap samples {}, which are already there: the same samples "
-                                "would count twice",
+                    fmt::format("samples {} overlap samples {}, which the film already has: the same "
+                                "samples would count twice",
                                 rangeText(range), rangeText(*before)));
     const bool joins_before = before != ranges_.end() && before->second == range.first;
     const bool joins_next = next != ranges_.end() && next->first == range.second;
@@ -115,7 +115,7 @@ Film::Film(FilmShape shape) : shape_(shape) {
     if (bytes > kWorthAsking && bytes > availableHostMemory())
         throw Error(ErrorKind::Device,
                     fmt::format("a film of {} × {} pixels with {} channels takes {:.1f} GB of memory, and "
-                                "{:.1f} GB are free; make it smaller, or render parts of it with --crop",
+                                "{:.1f} GB are free; reduce it, or render parts of it with --crop",
                                 shape.width, shape.height, shape.channels, static_cast<double>(bytes) / 1e9,
                                 static_cast<double>(availableHostMemory()) / 1e9));
     sums.assign(pixels * shape.channels * 2, 0.0);

@@ -48,7 +48,7 @@ std::array<Section<Byte>, 3> sectionsOf(AnyFilm& film) {
 }
 
 /// Several planes of one block, filled at once: a walk over the block for each single plane would load each
-/// of its cache lines anew for each byte.
+/// of its cache lines again for each byte.
 class Planes {
 public:
     static constexpr std::size_t kAtOnce = 64;  // A cache line of a record.

@@ -353,7 +353,7 @@ Development developmentFrom(const Json& json) {
     const auto name = json.at("color_space").get<std::string>();
     const auto found = std::find(kSpaceNames.begin(), kSpaceNames.end(), name);
     if (found == kSpaceNames.end())
-        throw Error(ErrorKind::Usage, fmt::format("names the unknown colour space '{}'", name));
+        throw Error(ErrorKind::Usage, fmt::format("has the unknown colour space '{}'", name));
     development.color_space = static_cast<ColorSpace>(found - kSpaceNames.begin());
     development.exposure_ev = inRange(json.at("exposure_ev"), -100, 100);
     development.apply_to_float = json.at("apply_to_float").get<bool>();
@@ -375,7 +375,7 @@ SpectralChannels spectralFrom(const Json& json) {
     channels.responses = json.at("responses").get<std::vector<std::string>>();
     if (!areSpectralBins(channels.bins) || channels.responses.size() > kMostSensorResponses ||
         !std::all_of(channels.responses.begin(), channels.responses.end(), isResponseName))
-        throw Error(ErrorKind::Usage, "has a spectral film that none can be");
+        throw Error(ErrorKind::Usage, "has an invalid spectral film");
     return channels;
 }
 
@@ -418,7 +418,7 @@ FilmRecord recordFrom(const Json& json) {
         const Json& brightest = json.at("brightest_path");
         record.paths.brightest = {brightest.at("luminance").get<double>(), brightest.at("rare").get<bool>()};
         if (!(record.paths.brightest.luminance > 0))
-            throw Error(ErrorKind::Usage, "has a brightest path without light");
+            throw Error(ErrorKind::Usage, "has a brightest path that carries no light");
     }
     record.width = pixelsFrom(json.at("resolution").at(0));
     record.height = pixelsFrom(json.at("resolution").at(1));
@@ -447,7 +447,7 @@ FilmRecord recordFrom(const Json& json) {
                                 record.height, kFilmSideMax));
     const auto& [x0, y0, x1, y1] = record.window;
     if (x0 >= x1 || y0 >= y1 || x1 > record.width || y1 > record.height)
-        throw Error(ErrorKind::Usage, "has a window that is none of its film");
+        throw Error(ErrorKind::Usage, "has a window outside its film");
     return record;
 }
 
@@ -521,7 +521,7 @@ std::vector<std::string> differingTraits(const FilmRecord& found, const FilmReco
                 fmt::format("{} {} {}, not {}", want.name, plural ? "are" : "is", have->text, want.text));
         else
             sentences.push_back(fmt::format("{} {} ({} in both)", want.name,
-                                            plural ? "are others" : "is another", have->text));
+                                            plural ? "differ" : "differs", have->text));
     }
     return sentences;
 }
@@ -547,7 +547,7 @@ std::string dateUtc() {
         if (!seconds.value || *seconds.value > kYear9999)
             throw Error(
                 ErrorKind::Usage,
-                fmt::format("SOURCE_DATE_EPOCH is '{}', and not the seconds since 1970 that it should be",
+                fmt::format("SOURCE_DATE_EPOCH is '{}'; it must be a number of seconds since 1970",
                             epoch));
         now = static_cast<std::time_t>(*seconds.value);
     }

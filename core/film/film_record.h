@@ -1,6 +1,5 @@
-/// What a film knows of the scene that its samples are of: enough to make images of it without the scene
-/// file, and to say in words why a film and a scene do not fit. Kept in .crtfilm files as JSON
-/// (checkpoint.h).
+/// The film's record of its scene: enough to make images without the scene file, and to explain in words why
+/// a film and a scene do not match. Kept in .crtfilm files as JSON (checkpoint.h).
 #pragma once
 
 #include "film/path_facts.h"
@@ -24,7 +23,7 @@ inline constexpr std::uint32_t kFilmSideMax = 65535;  ///< Of a film, as scene f
 struct SceneTrait {
     std::string name;    ///< "resolution", "the camera"
     std::string text;    ///< "512 × 512"
-    std::string digest;  ///< Of what the text leaves out; empty: nothing.
+    std::string digest;  ///< A hash of the details that the text leaves out; empty: none.
     bool operator==(const SceneTrait&) const = default;
 };
 
@@ -33,9 +32,9 @@ struct FilmRecord {
     std::uint64_t seed = 0;
     PathFacts paths;                      ///< For error estimates.
     int width = 0, height = 0;            ///< Of the whole film.
-    std::array<int, 4> window{};          ///< What the film holds of it: x0, y0, x1, y1, half open.
-    std::uint32_t aovs = 0;               ///< Bits of Aov that the scene's EXR files ask for.
-    SpectralChannels spectral;            ///< What the film's last channels are.
+    std::array<int, 4> window{};          ///< The part of it that the film holds: x0, y0, x1, y1, half open.
+    std::uint32_t aovs = 0;               ///< Bits of Aov that the scene requests for its EXR files.
+    SpectralChannels spectral;            ///< Contents of the film's last channels.
     Development development;
     std::map<std::string, Vec3d> whites;  ///< Named spectra of the scene that are lights: XYZ with Y = 1.
     RowMatrix4d world_to_camera{};        ///< x to the right, y up, the camera looks along −z.

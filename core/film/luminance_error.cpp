@@ -55,7 +55,7 @@ double meanLuminance(std::span<const float> luminances) {
 
 double meanSquaredDifference(std::span<const float> a, std::span<const float> b) {
     if (a.size() != b.size() || a.empty())
-        throw Error(ErrorKind::Internal, "an error needs two images of one size");
+        throw Error(ErrorKind::Internal, "an error needs two images of the same size");
     double squares = 0;
     for (std::size_t p = 0; p < a.size(); ++p) {
         const double difference = static_cast<double>(a[p]) - b[p];

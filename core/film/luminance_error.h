@@ -17,7 +17,7 @@ namespace crt::stats {
 
 using Rgb = std::array<double, 3>;
 
-/// What R, G and B add to the film's Y; together 1 for white. For ColorSpace::Xyz (0, 1, 0).
+/// Weights of R, G and B in the film's Y; together 1 for white. For ColorSpace::Xyz (0, 1, 0).
 Rgb luminanceWeights(ColorSpace space);
 /// The same from CIE xy of red, green, blue and white, as an EXR has them. For AcesCg they differ by some
 /// per cent from those above: a film's white, D65, was adapted to that of ACES. Where an image names a
@@ -44,9 +44,9 @@ double relativeRmse(double mse, double reference_mean);
 /// (mean − reference) / |reference|: 0 when both are equal.
 double relativeBias(double mean, double reference_mean);
 
-/// What a deviation of one colour channel is measured in: the channel's own mean in the reference, or mean
-/// luminance where that is larger. So a channel that is 0 or below 0, as a saturated colour makes it, counts
-/// like any other.
+/// The unit of a deviation of one colour channel: the channel's own mean in the reference, or mean luminance
+/// where that is larger. So a channel that is 0 or below 0, as a saturated colour makes it, counts like any
+/// other.
 double channelScale(double channel_mean, double mean_luminance);
 
 /// Error of a plane of luminances against a reference.

@@ -96,11 +96,11 @@ Image resolveImage(const Film& film, const Development& development, std::uint32
                    const SpectralChannels& spectral) {
     const FilmShape& shape = film.shape();
     if (spectral.count() > shape.spectral)
-        throw Error(ErrorKind::Internal, "an image asks for more spectral channels than its film has");
+        throw Error(ErrorKind::Internal, "an image needs more spectral channels than its film has");
     for (const AovRow& row : kAovRows)
         if ((aovs & kAovsOfFirstHits & ~shape.aovs & row.aov) != 0)
             throw Error(ErrorKind::Usage,
-                        fmt::format("an output asks for the {} plane, but the film was rendered without it",
+                        fmt::format("an output needs the {} plane, but the film was rendered without it",
                                     row.name));
 
     const ColorSpace space = development.color_space;
@@ -190,7 +190,7 @@ Image resolveImage(const Film& film, const Development& development, std::uint32
     });
 
     image.chromaticities = chromaticities(space);
-    // Who rendered it, where and when is for the caller to add.
+    // The caller adds who rendered it, where and when.
     image.metadata = {{kColorInteropIdKey, spaceName(space)},
                       {"crt/spp", std::to_string(film.samples.count())},
                       {"crt/sampleRanges", film.samples.text()},

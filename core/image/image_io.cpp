@@ -324,7 +324,8 @@ void writeImage(const std::string& path, OutputFormat format, const Image& image
         image.integers.size() != std::size_t{image.width} * image.height * image.integer_channels.size())
         throw Error(
             ErrorKind::Internal,
-            fmt::format("the image for '{}' does not have the pixels that its size and channels say", path));
+            fmt::format("the image for '{}' has a number of values that contradicts its size and channels",
+                        path));
     switch (format) {
         case OutputFormat::Exr: return writeExr(path, image);
         case OutputFormat::Pfm: return writePfm(path, image);

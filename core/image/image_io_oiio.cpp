@@ -308,8 +308,8 @@ bool isPng(const ImageInput& input) { return std::strcmp(input.format_name(), "p
 std::unique_ptr<ImageInput> openImage(const char* path, ImageSpec& spec) {
     if (std::unique_ptr<ImageInput> input = openKnown(path, spec, ImageSpec())) return input;
     throw Failure{
-        "it is no EXR, PNG, PFM, PPM or Radiance HDR file; OpenImageIO's oiiotool makes one of others: "
-        "oiiotool IN -o OUT.exr"};
+        "it is not an EXR, PNG, PFM, PPM or Radiance HDR file; OpenImageIO's oiiotool converts other "
+        "formats: oiiotool IN -o OUT.exr"};
 }
 
 /// CIE XYZ as primaries.
@@ -449,7 +449,8 @@ std::vector<int> colorChannels(const ImageSpec& spec) {
     if (others.size() == 1) return others;
     std::string names;
     for (const std::string& name : spec.channelnames) names += (names.empty() ? "" : ", ") + name;
-    throw Failure{"it has the channels " + names.substr(0, 200) + "; a texture has R, G and B, or one"};
+    throw Failure{"it has the channels " + names.substr(0, 200) + "; a texture needs R, G and B, or a "
+                                                                  "single channel"};
 }
 
 std::uint32_t texelType(const ImageSpec& spec) {
@@ -528,7 +529,7 @@ void readJpegPart(Part part, const char* path, CrtTexelsInfo& info, const Target
 
 void readTgaPart(Part part, const char* path, CrtTexelsInfo& info, const Target& to) {
     if (!crt::image::beginsAsTga(path))
-        throw Failure{"it is no PNG, JPEG, TGA, EXR, Radiance HDR or PFM file"};
+        throw Failure{"it is not a PNG, JPEG, TGA, EXR, Radiance HDR or PFM file"};
     const auto tga_part = part == Part::Color ? crt::image::TgaPart::Color : crt::image::TgaPart::Alpha;
     require(crt::image::readTga(path, tga_part, &info, to.data, to.bytes));
 }

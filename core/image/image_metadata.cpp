@@ -39,7 +39,7 @@ constexpr std::array<NamedSpace, 3> kSpaces{
 std::string spaceText(const std::array<double, 8>& primaries) {
     for (const NamedSpace& s : kSpaces)
         if (alike(primaries, chromaticities(s.space))) return s.name;
-    return fmt::format("that of the primaries {:.4g}", fmt::join(primaries, " "));
+    return fmt::format("the one with the primaries {:.4g}", fmt::join(primaries, " "));
 }
 
 std::string exposureText(double ev) { return fmt::format("{:+g} EV", ev); }
@@ -108,7 +108,7 @@ std::vector<std::string> unknownConditions(const ColorConditions& of_a, const st
     const auto one = [&](const ColorConditions& known, const std::string& says,
                          const ColorConditions& unknown, const std::string& silent) {
         const auto add = [&](const char* what, const std::string& value) {
-            sentences.push_back(fmt::format("{} does not say its {}; it is taken as that of {}: {}", silent,
+            sentences.push_back(fmt::format("{} does not state its {}; crt assumes that of {}: {}", silent,
                                             what, says, value));
         };
         if (known.exposure_ev && !unknown.exposure_ev && *known.exposure_ev != 0)

@@ -121,13 +121,13 @@ double exposureIn(std::string_view value) {
     char* end = nullptr;
     const double exposure = std::strtod(text.c_str(), &end);
     if (text.empty() || *end != '\0' || !std::isfinite(exposure) || !(exposure > 0))
-        throw RadianceFault(fmt::format("its EXPOSURE is '{}', which is no positive number",
+        throw RadianceFault(fmt::format("its EXPOSURE is '{}', which is not a positive number",
                                         std::string_view(text).substr(0, 40)));
     return exposure;
 }
 
 Order takeRadianceHeader(RadianceBytes& bytes, RadianceHeader& header) {
-    if (bytes.line().rfind("#?", 0) != 0) throw RadianceFault("it is no Radiance HDR file");
+    if (bytes.line().rfind("#?", 0) != 0) throw RadianceFault("it is not a Radiance HDR file");
     bool has_format = false;
     constexpr int kMostLines = 4096;
     for (int lines = 0;; ++lines) {
@@ -204,7 +204,7 @@ void takeRow(RadianceBytes& bytes, std::vector<Rgbe>& row) {
                          first[1] == 2 && first[2] < 128;
     if (!in_runs) return takePixelsAndOldRuns(bytes, first, row);
     if (first[2] * 256u + first[3] != row.size())
-        throw RadianceFault("a row has another length than its header says");
+        throw RadianceFault("a row has a length that differs from its header");
     takeRuns(bytes, row);
 }
 

@@ -115,7 +115,7 @@ void tellClipped(const std::string& path, const Image& image, const EncodedImage
     const double stops = 3 * share > 0.1 ? stopsTooBright(image) : 0;
     if (stops > 0)
         logWarning(
-            "{}; the picture is too bright: about {:.1f} stops less of film.exposure_ev would show it",
+            "{}; the image is overexposed: reduce film.exposure_ev by about {:.1f} stops",
             clipped, std::ceil(stops * 10) / 10);
     else
         logInfo("{}", clipped);
@@ -152,8 +152,8 @@ void tellWhatIsLost(const std::string& path, const Image& image, const EncodedIm
         brightest > 0 &&
         std::all_of(encoded.rgb.begin(), encoded.rgb.end(), [](std::uint8_t v) { return v == 0; }))
         logWarning(
-            "'{}' is black: its brightest value is {:.2g}, too dark for 8 bits; about {} stops more of "
-            "film.exposure_ev would show it",
+            "'{}' is black: its brightest value is {:.2g}, too dark for 8 bits; increase film.exposure_ev "
+            "by about {} stops",
             path, brightest, std::ceil(std::log2(0.5 / brightest)));
     if (encoded.clipped_values > 0) tellClipped(path, image, encoded);
 }

@@ -131,7 +131,7 @@ public:
         if (good) return;
         const int why = errno;
         if (descriptor_ >= 0) ::close(descriptor_);
-        refuse(source.name, fmt::format("there is no memory for it: {}", std::strerror(why)));
+        refuse(source.name, fmt::format("there is not enough memory for it: {}", std::strerror(why)));
     }
     ~MemoryFile() { ::close(descriptor_); }
     MemoryFile(const MemoryFile&) = delete;

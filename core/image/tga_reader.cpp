@@ -160,7 +160,7 @@ std::string takePixels(const File& file, const Header& header, Canvas& canvas) {
         if (!take(file, bytes.data(), different * pixel)) return kEndsEarly;
         for (std::size_t i = 0; i < count; ++i)
             if (!canvas.put(bytes.data() + (different == 1 ? 0 : i * pixel)))
-                return "a pixel has a colour that its map does not have";
+                return "a pixel has a colour that is not in the colour map";
     }
     return {};
 }
@@ -176,8 +176,9 @@ std::string readTga(const char* path, TgaPart part, CrtTexelsInfo* info, unsigne
                     std::uint64_t buffer_bytes) {
     const File file(std::fopen(path, "rbe"));
     Header header;
-    if (!takeHeader(file, header)) return "it is no TGA file";
-    if ((header.descriptor & 0xc0) != 0) return "its rows are interleaved, which nobody writes any more";
+    if (!takeHeader(file, header)) return "it is not a TGA file";
+    if ((header.descriptor & 0xc0) != 0) return "its rows are interleaved, which crt does not support; save "
+                                                "it without interleaving";
     std::error_code unknown;
     const std::uint64_t file_bytes = std::filesystem::file_size(path, unknown);
     const std::uint64_t pixels = std::uint64_t{header.width} * header.height,
@@ -192,7 +193,7 @@ std::string readTga(const char* path, TgaPart part, CrtTexelsInfo* info, unsigne
         header.kind != kGrey && header.alphaBits() > 0 && (color_depth == 16 || color_depth == 32);
     if (has_alpha) {
         const unsigned meaning = alphaMeaning(file, file_bytes);
-        if (meaning == 4) return "its colours are multiplied by its alpha; save it without that";
+        if (meaning == 4) return "its colours are premultiplied by alpha; save it without premultiplication";
         has_alpha = meaning == 3;
     }
     info->width = header.width;

@@ -127,7 +127,7 @@ void DeviceFilm::renderInBands(const RenderRange& range, const std::function<voi
             ++i;
         } catch (const Error& error) {
             if (!error.lacksMemory() || band.rows() == 1) throw;
-            // Somebody took memory since the last time, or it was too little to work in.
+            // Another process has taken memory since the last time, or the rest was too little to work in.
             cut(band.first, (band.rows() + 1) / 2);
             logInfo("{}; so it is rendered in bands of {} rows from row {} on", error.what(),
                     bands_[i].rows(), band.first);

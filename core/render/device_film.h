@@ -28,10 +28,10 @@ public:
     /// has room for the scene beside a single row, that error is thrown.
     void setScene(const std::function<void(double)>& progress = {});
 
-    /// Whether the film is rendered in bands: from setScene() on, or from the first render() on, when that
+    /// True if the film is rendered in bands: from setScene() on, or from the first render() on, when that
     /// finds that the film leaves no room to work in.
     bool inBands() const { return !bands_.empty(); }
-    /// How many; 1 for a film that lies on the devices.
+    /// Number of bands; 1 for a film that lies on the devices.
     std::size_t bands() const { return inBands() ? bands_.size() : 1; }
 
     /// Adds a range to all pixels. `progress` gets [0,1].
@@ -62,7 +62,7 @@ private:
     bool rendered_ = false;  ///< Something, since setScene().
     std::optional<Film> part_;    ///< A band's. Kept, as memory that is new costs as much as filling it.
     std::optional<Film> pass_;    ///< All bands' of one range. Likewise.
-    std::optional<Film> unread_;  ///< What was rendered in bands and not read.
+    std::optional<Film> unread_;  ///< The samples that were rendered in bands and not yet read.
     double fixed_seconds_ = 0;
 };
 

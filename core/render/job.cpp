@@ -25,12 +25,12 @@ namespace {
 /// The files that this job writes or may have to write.
 struct Files {
     OutputPlan outputs;
-    std::string checkpoint;          ///< Where a checkpoint goes if one is written.
+    std::string checkpoint;          ///< Path of a checkpoint if one is written.
     bool checkpoint_wanted = false;  ///< Also when nothing stops the render short.
-    std::string saved;               ///< Where it was written in the end.
+    std::string saved;               ///< The path that was finally written.
     std::string resume;              ///< Empty: start from nothing.
     std::string report;              ///< Empty: none.
-    FilmGuard films;                 ///< What lies where films will be written.
+    FilmGuard films;                 ///< Files that exist in places where films will be written.
 };
 
 std::vector<std::string> imageNames(const OutputPlan& plan) {
@@ -49,7 +49,8 @@ Files planFiles(const Job& job, const Scene& scene) {
                        : !job.resume_file.empty()   ? job.resume_file
                                                   : besideOutput(files.outputs.first, kCheckpointExtension);
     files.checkpoint_wanted =
-        job.resume || !job.checkpoint_file.empty();  // Who resumes once will want to resume again.
+        job.resume || !job.checkpoint_file.empty();  // A run that was resumed once is likely to be resumed
+                                                     // again.
     if (job.resume) {
         files.resume = !job.resume_file.empty() ? job.resume_file : files.checkpoint;
         std::error_code unreadable;
@@ -85,7 +86,7 @@ Files planFiles(const Job& job, const Scene& scene) {
     return files;
 }
 
-/// What an earlier run left.
+/// The film of an earlier run.
 std::optional<EarlierFilm> readEarlierFilm(const Files& files) {
     if (files.resume.empty()) return std::nullopt;
     const Stage stage("reading " + files.resume);
@@ -93,8 +94,7 @@ std::optional<EarlierFilm> readEarlierFilm(const Files& files) {
     return EarlierFilm{files.resume, std::move(film), std::move(identity)};
 }
 
-/// What went wrong while writing, the first of it: one output that fails must not keep the others from being
-/// written.
+/// The first error while writing: one output that fails must not keep the others from being written.
 class FirstFailure {
 public:
     explicit FirstFailure(std::optional<Error> earlier) : first_(std::move(earlier)) {}
@@ -104,7 +104,7 @@ public:
         try {
             write();
         } catch (const Error& error) {
-            // The first is reported by whoever catches it in the end; the others have only this line.
+            // The caller reports the first one; the others have only this line.
             note(error);
         } catch (const std::exception& error) {  // Out of memory, or no thread.
             note(Error(ErrorKind::Output, fmt::format("cannot write an output: {}", error.what())));
@@ -123,7 +123,7 @@ private:
     std::optional<Error> first_;
 };
 
-/// Where it was written: a larger film that lies there stays.
+/// The path that was written: an existing larger film stays.
 std::string writeFilm(FilmGuard& films, const std::string& name, const Film& film,
                       const FilmIdentity& identity) {
     const std::string place = films.placeFor(name, film.samples.count());
@@ -178,7 +178,8 @@ std::string summary(const RunFacts& facts, const Film& film, bool light_is_missi
     return text;
 }
 
-/// How the target error was reached; else what it, or 1 %, would still take, where that is known.
+/// Reports that the target error was reached, or else the samples that it, or 1 %, would still take, if
+/// known.
 void tellTarget(const RunFacts& facts) {
     const double target = facts.target_error > 0 ? facts.target_error : 0.01;
     const auto half_width = [](const std::optional<ErrorEstimate>& error) {
@@ -186,14 +187,14 @@ void tellTarget(const RunFacts& facts) {
     };
     if (facts.stop == StopReason::Target)
         logInfo(
-            "target error {:.3g} % reached: 95 % half-width {}, of the even pixels {}, of the odd ones {}",
+            "target error {:.3g} % reached: 95 % half-width {}, even pixels {}, odd pixels {}",
             target * 100, half_width(facts.error), half_width(facts.deciding), half_width(facts.judging));
     else if (!facts.error->known() && facts.error->rare_paths > 0)
         logInfo("the error is not yet known: surfaces mirror a light or scatter it into a narrow lobe, "
-                "single paths may bring {:.2g} times the mean luminance, and too few of them were met",
+                "single paths may carry {:.2g} times the mean luminance, and too few of them were sampled",
                 facts.error->rare_paths);
     else if (facts.target_error > 0 && !facts.error->known())
-        logInfo("whether the target error is reached cannot be told: too few paths carry the light");
+        logInfo("it is unknown whether the target error is reached: too few paths carry the light");
     if (!facts.error->known() || facts.error->half_width_95 <= target || facts.rendered_samples == 0) return;
     const auto samples = static_cast<double>(facts.samples.count());
     const stats::Interval needed = facts.error->samplesFor(target, samples);
@@ -213,7 +214,8 @@ Scene loadScene(const SceneRequest& request) {
         const auto& [x0, y0, x1, y1] = *request.crop;
         if (x0 < 0 || y0 < 0 || x0 >= x1 || y0 >= y1 || x1 > scene.film.width || y1 > scene.film.height)
             throw Error(ErrorKind::Usage,
-                        fmt::format("--crop {},{},{},{} is no rectangle within the film of {} x {} pixels",
+                        fmt::format("--crop {},{},{},{} is not a rectangle within the film of {} x {} "
+                                    "pixels",
                                     x0, y0, x1, y1, scene.film.width, scene.film.height));
         scene.film.crop = *request.crop;
     }
@@ -223,14 +225,15 @@ Scene loadScene(const SceneRequest& request) {
 int runJob(const Job& job, Watch& watch) {
     const Stopwatch total;
 
-    // What is to be seen, and where it is to be written.
+    // The scene and its outputs.
     Scene scene = loadScene(job.scene);
     if (job.expose_automatically && scene.integrator.type != IntegratorType::Path)
-        throw Error(ErrorKind::Usage, "--expose auto is for integrator.type path: views show no light");
+        throw Error(ErrorKind::Usage, "--expose auto needs integrator.type path: the other types do not "
+                                      "show light");
     if (job.target_error > 0) requireReplicates(scene);
     Files files = planFiles(job, scene);
 
-    // What is there already, and what is missing.
+    // The existing samples and the missing ones.
     std::optional<EarlierFilm> earlier = readEarlierFilm(files);
     const SamplingPlan plan =
         planSamples(job, scene, earlier ? earlier->film.samples : SampleRanges());
@@ -277,7 +280,7 @@ int runJob(const Job& job, Watch& watch) {
     if (facts.stop == StopReason::Interrupted && run.film.samples.count() == 0)
         logInfo("stopped by {} before all pixels had a sample: there is no image", facts.request.cause);
     else if (facts.stop == StopReason::Interrupted)
-        logInfo("stopped by {}; the same command with --resume {} goes on from here", facts.request.cause,
+        logInfo("stopped by {}; the same command with --resume {} continues from here", facts.request.cause,
                 files.saved);
     return facts.exit_code;
 }

@@ -24,7 +24,7 @@ struct SceneRequest {
 /// Reads it. Throws crt::Error.
 Scene loadScene(const SceneRequest& request);
 
-/// What the command line asks for, checked as far as that goes without the scene.
+/// The options of the command line, checked as far as possible without the scene.
 struct Job : RenderOptions {
     SceneRequest scene;
 

@@ -59,7 +59,7 @@ std::vector<Face> oneSidedFaces(const Scene& scene, const Object& object) {
     return faces;
 }
 
-/// How far a shape is from the middle of its frame at most.
+/// Largest distance of a shape from the origin of its frame.
 double radiusAround(const Quadric& shape, const Matrix4d& transform) {
     const double scale = evenScaleOf(transform).value_or(std::numeric_limits<double>::infinity());
     const double z = std::max(std::abs(shape.from_z), std::abs(shape.to_z));
@@ -114,7 +114,7 @@ std::string nameOf(const Object& object) {
     return object.name.empty() ? "an object without a name" : fmt::format("'{}'", object.name);
 }
 
-/// What may be wrong in this scene.
+/// Possible causes in this scene.
 std::vector<std::string> reasonsForBlack(const Scene& scene) {
     std::vector<std::string> lamps, one_sided;
     for (const Object& object : scene.objects) {
@@ -133,17 +133,17 @@ std::vector<std::string> reasonsForBlack(const Scene& scene) {
         constexpr std::size_t kShown = 3;
         const std::size_t shown = std::min(one_sided.size(), kShown);
         reasons.push_back(fmt::format(
-            "{}{} may face away: a lamp lights the side from which its vertices run counter-clockwise, with "
-            "'two_sided: true' both",
+            "{}{} may face away: an emitter shines to the side from which its vertices run "
+            "counter-clockwise; 'two_sided: true' makes it shine to both",
             fmt::join(one_sided.begin(), one_sided.begin() + static_cast<std::ptrdiff_t>(shown), ", "),
             shown < one_sided.size() ? fmt::format(" and {} more", one_sided.size() - shown) : ""));
     }
     if (scene.integrator.max_depth == 0)
-        reasons.emplace_back("'max_depth: 0' shows lamps and no light on anything");
+        reasons.emplace_back("'max_depth: 0' shows emitters and no illuminated surfaces");
     if (!scene.point_lights.empty())
-        reasons.emplace_back("point, spot and directional lights are not seen by the camera, nor by way of "
-                             "mirrors, smooth metals and glass");
-    if (!scene.integrator.nee && !sky) reasons.emplace_back("with 'nee: false' few paths meet a small lamp");
+        reasons.emplace_back("the camera does not see point, spot and directional lights, neither directly "
+                             "nor in mirrors, smooth metals and glass");
+    if (!scene.integrator.nee && !sky) reasons.emplace_back("with 'nee: false' few paths hit a small light");
     constexpr double kNarrow = 0.028;  // As of a fov of pi degrees, which may be meant as radians.
     if (const double tangent = std::min(scene.camera.tan_half_width, scene.camera.tan_half_height);
         tangent < kNarrow)
@@ -185,8 +185,8 @@ double brightestLuminance(const Film& film) {
 void warnOfIdleLamps(const Scene& scene) {
     for (const std::string& lamp : idleLamps(scene))
         logWarning(
-            "{} lights nothing: it emits on one side only, and neither a surface nor the camera is on that "
-            "side; reverse the order of its vertices, or say 'two_sided: true'",
+            "{} illuminates nothing: it emits on one side only, and neither a surface nor the camera is on "
+            "that side; reverse the order of its vertices, or add 'two_sided: true'",
             lamp);
 }
 
@@ -219,8 +219,8 @@ void warnOfLargeUnits(const Film& film, const Scene& scene) {
     if (nearest == nullptr || distance < kFar) return;
     const double brightest = brightestLuminance(film) * std::exp2(scene.film.exposure_ev);
     if (brightest <= 0 || brightest > kBlack) return;
-    logWarning("the picture is all but black: a scene unit counts as a metre, so the nearest light, '{}', "
-               "is {:.3g} m from the camera; where lengths are in millimetres write 'unit: mm'",
+    logWarning("the image is nearly black: a scene unit is a metre, so the nearest light, '{}', is {:.3g} m "
+               "from the camera; if lengths are in millimetres write 'unit: mm'",
                nearest->name, distance);
 }
 

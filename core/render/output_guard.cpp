@@ -92,15 +92,16 @@ void refuseOverInputs(const std::vector<std::string>& inputs, const std::vector<
             throw Error(
                 ErrorKind::Usage,
                 output == input->second
-                    ? fmt::format("the output '{}' would replace a file that is read", output)
-                    : fmt::format("the output '{}' would replace '{}', which is read: they are one file",
+                    ? fmt::format("the output '{}' would replace an input file", output)
+                    : fmt::format("the output '{}' would replace the input '{}': they are the same file",
                                   output, input->second),
                 {output});
         if (const auto other = written.find(identity); other != written.end())
             throw Error(ErrorKind::Usage,
                         output == other->second
                             ? fmt::format("two outputs have the same name '{}'", output)
-                            : fmt::format("the outputs '{}' and '{}' are one file", other->second, output));
+                            : fmt::format("the outputs '{}' and '{}' are the same file",
+                                          other->second, output));
         return identity;
     };
     for (const std::string& output : outputs) written.emplace(check(output), output);
@@ -144,8 +145,8 @@ void FilmGuard::look(const std::string& path, bool wanted, bool replace) {
         } catch (const Error& error) {
             if (wanted)
                 throw Error(ErrorKind::Usage,
-                            fmt::format("a film would replace '{}', which is none: {}; choose another name, "
-                                        "or add --overwrite",
+                            fmt::format("a film would replace '{}', which is not a film: {}; choose another "
+                                        "name, or add --overwrite",
                                         path, error.what()),
                             {path});
             place.samples = kNoFilm;
@@ -162,8 +163,8 @@ void FilmGuard::requireRoom(std::uint64_t samples) const {
         if (place.wanted && place.samples > samples)
             throw Error(ErrorKind::Usage,
                         fmt::format("'{}' holds {} samples per pixel and would be replaced by {}: add "
-                                    "--resume to go on from it, or --overwrite "
-                                    "to lose it, or choose another name",
+                                    "--resume to continue it, or --overwrite to replace it, or choose "
+                                    "another name",
                                     path, place.samples, samples),
                         {path});
 }
@@ -175,7 +176,7 @@ std::string FilmGuard::placeFor(const std::string& path, std::uint64_t samples) 
         found->second.file = now;
         found->second.samples = now.empty() ? 0 : samplesAt(path);
         if (found->second.samples > samples)
-            logWarning("another program has written '{}' meanwhile, which holds more samples: it stays",
+            logWarning("another program has written '{}' in the meantime; it holds more samples and is kept",
                        path);
     }
     if (samples >= found->second.samples) return path;
@@ -193,7 +194,7 @@ std::string FilmGuard::placeFor(const std::string& path, std::uint64_t samples) 
 void FilmGuard::written(const std::string& path) {
     const auto found = places_.find(path);
     if (found == places_.end()) return;
-    found->second.samples = 0;  // What lies there now is of this run.
+    found->second.samples = 0;  // The existing file was written by this run.
     found->second.file = fileAt(path);
     if (found->second.beside.empty()) return;
     std::error_code gone;

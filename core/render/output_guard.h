@@ -1,5 +1,4 @@
-/// What an output must not replace: a file that the run reads, another of its outputs, a film that holds
-/// more samples.
+/// Refuses outputs that would replace an input file, another output, or a film that holds more samples.
 #pragma once
 
 #include "scene/scene.h"

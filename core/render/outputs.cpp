@@ -46,7 +46,7 @@ OutputPlan planOutputs(const std::vector<std::string>& files, const Scene& scene
                 throw Error(
                     ErrorKind::Usage,
                     fmt::format(
-                        "the name of the output '{}' ends in none of .exr, .png, .ppm, .pfm and .crtfilm",
+                        "the name of the output '{}' does not end in .exr, .png, .ppm, .pfm or .crtfilm",
                         file));
             }
         }
@@ -55,9 +55,10 @@ OutputPlan planOutputs(const std::vector<std::string>& files, const Scene& scene
     for (const std::string& film : plan.films)
         if (isStandardOutput(film))
             throw Error(ErrorKind::Usage,
-                        fmt::format("'{}': films are written to files, which crt reads again", film));
+                        fmt::format("'{}': a film must be written to a file, because crt reads it again",
+                                    film));
     if (std::count_if(names.begin(), names.end(), isStandardOutput) > 1)
-        throw Error(ErrorKind::Usage, "two outputs would go to standard output, one after the other");
+        throw Error(ErrorKind::Usage, "only one output can go to standard output");
     std::set<std::string> seen;
     for (const std::string& name : names)
         if (!seen.insert(std::filesystem::path(name).lexically_normal().string()).second)
@@ -84,7 +85,7 @@ Image developedImage(const Output& output, const Film& film, const FilmIdentity&
         if (!value.empty()) image.metadata.emplace_back(key, std::move(value));
     };
     add("Software", "crt " CRT_VERSION);
-    add("crt/version", identity.version);  // Of the samples; who made this file of them is the software.
+    add("crt/version", identity.version);  // Of the samples; Software is the writer of this file.
     add("crt/sceneHash", identity.scene_hash);
     add("crt/seed", std::to_string(record.seed));
     if (record.complete) add("crt/complete", *record.complete ? "1" : "0");
@@ -122,7 +123,8 @@ Image developedImage(const Output& output, const Film& film, const FilmIdentity&
 
 void exposeAutomatically(const Film& film, FilmRecord& record) {
     if (!record.holdsRadiance())
-        throw Error(ErrorKind::Usage, "--expose auto is for integrator.type path: views show no light");
+        throw Error(ErrorKind::Usage, "--expose auto needs integrator.type path: the other types do not "
+                                      "show light");
     const std::optional<double> exposure_ev = autoExposure_ev(film);
     if (!exposure_ev) return;  // A black film has its own warning.
     record.development.exposure_ev = *exposure_ev;
@@ -131,8 +133,8 @@ void exposeAutomatically(const Film& film, FilmRecord& record) {
 
 void requireRecord(const std::string& path, const FilmIdentity& identity) {
     if (!identity.record)
-        throw Error(ErrorKind::Usage, fmt::format("'{}' is of an earlier crt, whose films do not say in "
-                                                  "which colours to develop them; name its scene: "
+        throw Error(ErrorKind::Usage, fmt::format("'{}' was written by an earlier crt, whose films lack "
+                                                  "development settings; name its scene: "
                                                   "crt merge --scene SCENE -o IMAGE {}",
                                                   path, path));
 }

@@ -1,4 +1,4 @@
-/// Which files a run writes, and writing them: shared by rendering, merging and developing.
+/// Chooses and writes the output files of a run: shared by rendering, merging and developing.
 #pragma once
 
 #include "film/checkpoint.h"
@@ -23,7 +23,7 @@ struct OutputPlan {
 std::uint32_t requestedAovs(const Scene& scene);
 
 /// Where `files` (-o) say, else the scene's outputs, else "<scene>.exr" and "<scene>.png" in the working
-/// directory. An EXR from -o holds the AOVs that the scene asks for. Throws crt::Error(Usage) when an
+/// directory. An EXR from -o holds the AOVs that the scene requests. Throws crt::Error(Usage) when an
 /// extension says no format or two names are the same.
 OutputPlan planOutputs(const std::vector<std::string>& files, const Scene& scene);
 

@@ -34,7 +34,7 @@ Film openFilm(std::optional<EarlierFilm> there, const CompiledScene& compiled, F
 /// A plugin may leave out what is only for humans.
 std::string textOrEmpty(const char* text) { return text != nullptr ? text : ""; }
 
-/// The driver behind a device, which only the list of devices tells.
+/// The driver of a device, which only the list of devices contains.
 std::string driverOf(const std::vector<CrtDevice>& devices, const std::string& device_name) {
     for (const CrtDevice& device : devices)
         if (arrayText(device.name) == device_name) return arrayText(device.driver);
@@ -46,12 +46,13 @@ void askForReport(Session& session, RunFacts& facts) {
     try {
         facts.backend = session.report();
     } catch (const Error& error) {
-        logWarning("no report from the backend: {}", error.what());
+        logWarning("the backend gave no report: {}", error.what());
     }
     facts.devices = session.group().shares();
 }
 
-/// Who renders, and when. A film that was complete before this run is written without any backend.
+/// User, host and date of the render. A film that was complete before this run is written without any
+/// backend.
 void describeRun(FilmIdentity& identity, const RunFacts& facts) {
     if (facts.backend_name.empty()) return;
     FilmRecord run;
@@ -74,21 +75,21 @@ void openDevices(Session& session, RunFacts& facts) {
     facts.backend_build = textOrEmpty(backend.table->build);
 }
 
-/// Whether the film has all the samples that were asked for. With nothing but a time to go by, the end of
-/// the time is the end of the work.
+/// True if the film has all requested samples. With nothing but a time to go by, the end of the time is the
+/// end of the work.
 bool isComplete(const RunFacts& facts) {
     return facts.stop == StopReason::Samples || facts.stop == StopReason::Target ||
            (facts.stop == StopReason::Time && facts.target_samples == 0);
 }
 
-/// What the film says of itself, but for its error.
+/// Facts about the film, except its error.
 void judge(const Film& film, const Scene& scene, RunFacts& facts) {
     facts.samples = film.samples;
     facts.invalid_samples = film.invalidSamples();
     warnOfBlackFilm(film, scene);
     warnOfLargeUnits(film, scene);
     if (facts.invalid_samples > 0)
-        logWarning("{} samples were no numbers (NaN or infinite) and were left out", facts.invalid_samples);
+        logWarning("{} samples were NaN or infinite and were left out", facts.invalid_samples);
 }
 
 }  // namespace
@@ -96,11 +97,11 @@ void judge(const Film& film, const Scene& scene, RunFacts& facts) {
 void requireReplicates(Scene& scene) {
     if (replicatesOf(scene) > 1) return;
     if (scene.integrator.type != IntegratorType::Path)
-        throw Error(ErrorKind::Usage, "--target-error is for integrator.type path: the views have no noise");
+        throw Error(ErrorKind::Usage, "--target-error needs integrator.type path: the other types have no "
+                                      "noise");
     if (scene.sampler.type == SamplerType::Sobol)
         throw Error(ErrorKind::Usage,
-                    "--target-error needs the replicates that sampler.replicates: 1 leaves out; add --set "
-                    "sampler.replicates=2");
+                    "--target-error needs at least 2 replicates; add --set sampler.replicates=2");
     scene.sampler.replicates = 2;
 }
 
@@ -149,7 +150,7 @@ void SceneOnDevices::open(RunFacts& facts) {
     session_->beginOpeningDevice();
 }
 
-/// What it takes to see the scene: one flat blob, and the mask of what it needs. Nothing is built for a
+/// The data that rendering needs: one flat blob, and the mask of its features. Nothing is built for a
 /// backend that brings it, nor where none will render.
 void SceneOnDevices::compile() {
     if (compiled_) return;
@@ -267,7 +268,7 @@ void judgeError(Rendered& run) {
             run.facts.judging = estimate(PixelSet::Odd);
         }
     } catch (const std::bad_alloc&) {  // The film matters more than its error.
-        logWarning("out of memory on the host: the image's error is not known");
+        logWarning("out of memory on the host: the error of the image is unknown");
     }
 }
 

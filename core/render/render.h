@@ -30,8 +30,8 @@ struct RenderOptions {
     double time_limit_seconds = 0;           ///< 0: none. Alone it replaces the scene's number of samples.
     double target_error =
         0;  ///< Stop at this relative error; 0: none. Alone it replaces the scene's number of samples.
-    std::function<void()> meanwhile{};  ///< Called on a thread of its own, once the devices are open: what
-                                        ///< need not wait for the render. Throws nothing.
+    std::function<void()> meanwhile{};  ///< Called on a separate thread once the devices are open, for work
+                                        ///< that need not wait for the render. Throws nothing.
     std::uint64_t chunk = 0;  ///< Samples per chunk; 0: so many that a chunk takes at most half a second.
 };
 
@@ -39,10 +39,10 @@ struct RenderOptions {
 /// two where it leaves that open. Throws crt::Error(Usage) where it cannot have them.
 void requireReplicates(Scene& scene);
 
-/// Which of the samples asked for are not `there`, and when to stop before they are all there.
+/// The requested samples that are not `there`, and the conditions for stopping early.
 SamplingPlan planSamples(const RenderOptions& options, const Scene& scene, const SampleRanges& there);
 
-/// What an earlier run left, with what it was rendered from.
+/// The film of an earlier run, with its scene.
 struct EarlierFilm {
     std::string name;  ///< In messages.
     Film film;
@@ -103,7 +103,7 @@ private:
     std::optional<DeviceFilm> devices_;  ///< Last: of the devices of the one and the scene of the other.
 };
 
-/// What the film knows of its error, into the facts of the run. It takes as long as adding a film.
+/// Adds the film's error estimate to the facts of the run. It takes as long as adding a film.
 void judgeError(Rendered& run);
 
 /// SceneOnDevices::render(), once.

@@ -42,7 +42,7 @@ const char* knowledgeName(ErrorKnowledge knowledge) {
     return "not yet known";
 }
 
-/// What the image knows of its own error (docs/error.md), relative to its mean luminance.
+/// The error estimate of the image (docs/error.md), relative to its mean luminance.
 Json estimateJson(const std::optional<ErrorEstimate>& error) {
     if (!error) return nullptr;
     Json json{{"knowledge", knowledgeName(error->knowledge)},

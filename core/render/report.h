@@ -1,5 +1,5 @@
-/// What a run did, as JSON: enough to repeat it, to compare two machines, and to see what was left out and
-/// what it cost.
+/// The report of a run as JSON: enough to repeat it, to compare two machines, and to see its features and
+/// costs.
 #pragma once
 
 #include "backend/crt_backend.h"

@@ -28,7 +28,7 @@ constexpr double kReadBytesPerSecond = 2e9; // First guess of what reading costs
 /// Thrown through a chunk that is not waited for any more.
 struct ChunkGivenUp {};
 
-/// How many samples the next chunk should have.
+/// Number of samples of the next chunk.
 class ChunkSizer {
 public:
     explicit ChunkSizer(std::uint64_t fixed) : fixed_(fixed) {}
@@ -231,7 +231,7 @@ SamplingResult sampleFilm(DeviceFilm& devices, Film& film, const SamplingPlan& p
         return reachesTarget(film, plan.target_error, plan.paths);
     };
 
-    // Why to stop before the samples are there, and even within a chunk; nothing while there is no reason.
+    // Reason to stop before all samples are taken, even within a chunk; nothing if there is none.
     const auto reasonToHurry = [&]() -> std::optional<StopReason> {
         if (const std::optional<StopRequest> request = watch.stopRequested()) {
             result.request = *request;
@@ -329,9 +329,9 @@ SamplingResult sampleFilm(DeviceFilm& devices, Film& film, const SamplingPlan& p
         try {
             recoverUnread();
         } catch (const ChunkGivenUp&) {
-            logDebug("some of the samples before are lost, too");
+            logDebug("some earlier samples are lost, too");
         } catch (const std::exception& error) {
-            logWarning("some of the samples before are lost, too: {}", error.what());
+            logWarning("some earlier samples are lost, too: {}", error.what());
         }
         loseUnread();
         if (film.samples.count() == 0 && result.stop == StopReason::Time)
@@ -340,15 +340,15 @@ SamplingResult sampleFilm(DeviceFilm& devices, Film& film, const SamplingPlan& p
                                    "more --time, or lower integrator.max_depth or film.resolution",
                                    sampling.seconds())));
         else
-            logWarning("the samples that were being taken are left out: they took too long after the render "
-                       "was to stop");
+            logWarning("the samples in progress are left out: they took too long after the render was "
+                       "stopped");
     } catch (const Error& error) {
         fail(error);
     } catch (const std::bad_alloc&) {
         fail(Error(ErrorKind::Device, "out of memory on the host: a smaller film needs less"));
     } catch (const std::system_error& error) {  // A thread that cannot be started.
         fail(Error(ErrorKind::Device,
-                   fmt::format("the host refuses what rendering needs: {}", error.what())));
+                   fmt::format("the operating system refused a resource: {}", error.what())));
     }
     result.seconds = sampling.seconds();
     return result;

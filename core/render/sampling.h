@@ -22,7 +22,7 @@ inline constexpr std::uint64_t kEndlessSamples = std::uint64_t{1} << 53;
 /// The part of `wanted` that `there` lacks, in order.
 std::vector<SampleRange> missingSamples(SampleRange wanted, const SampleRanges& there);
 
-/// Why sampling ended.
+/// Reason why sampling ended.
 enum class StopReason {
     Samples,      ///< Every sample asked for is there.
     Time,         ///< --time is up.
@@ -59,10 +59,10 @@ struct SamplingResult {
 /// caustic or a hidden lamp has been met at all.
 std::uint64_t nextTargetCheck(std::uint64_t samples, std::uint64_t pixels);
 
-/// Whether half_width_95 is known and at most `target` for the image, and for its even and its odd pixels
-/// each: of two halves that are independent of each other, each can veto what the other would have stopped
-/// at by luck. An error that is not known (error_estimate.h) stops nothing; and the wider the pixels'
-/// variances scatter, the farther the half-width lies above the estimate.
+/// True if half_width_95 is known and at most `target` for the image, and for its even and for its odd
+/// pixels: the two independent halves guard against stopping by luck. An error that is not known
+/// (error_estimate.h) stops nothing; and the wider the pixels' variances scatter, the farther the half-width
+/// lies above the estimate.
 bool reachesTarget(const Film& film, double target, const PathFacts& paths = {});
 
 /// Adds the plan's samples to `film`. When the last device fails, `film` holds what was last read from it,

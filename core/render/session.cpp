@@ -38,7 +38,7 @@ void Session::openDevice() {
 }
 
 DeviceGroup& Session::group() {
-    if (!group_) throw Error(ErrorKind::Internal, "a session is asked for a device that is not open");
+    if (!group_) throw Error(ErrorKind::Internal, "the session has not opened this device");
     return *group_;
 }
 

@@ -29,8 +29,8 @@ public:
 
     /// Opens the device, or the devices, unless they are open.
     void openDevice();
-    /// Begins to, on a thread of its own, and returns at once: opening a driver takes as long as compiling a
-    /// scene. What goes wrong is thrown by openDevice().
+    /// Starts opening on a separate thread and returns at once: opening a driver takes as long as compiling
+    /// a scene. openDevice() throws its errors.
     void beginOpeningDevice();
     /// Of the backend, best first. Requires openDevice().
     const std::vector<CrtDevice>& devices() const { return devices_; }

@@ -1,4 +1,4 @@
-/// What a caller sees of long work, and how it ends it early.
+/// Lets a caller follow long work and end it early.
 #pragma once
 
 #include "film/error_estimate.h"
@@ -9,7 +9,7 @@
 
 namespace crt {
 
-/// Where a render stands.
+/// Progress of a render.
 struct ProgressState {
     double samples = 0;  ///< Per pixel, with those of a resumed film; a fraction while a chunk runs.
     std::uint64_t target = 0;       ///< Samples per pixel to reach; 0: until the time is up.
@@ -21,7 +21,7 @@ struct ProgressState {
                         ///< its length is unknown.
     double target_error = 0;        ///< half_width_95 to stop at; 0: none.
     std::optional<ErrorEstimate> error;  ///< Of the image so far.
-    bool light_is_missing = false;       ///< Which that error does not contain.
+    bool light_is_missing = false;       ///< Light that the stated error does not include.
 
     /// Camera paths per second of this run; 0 while unknown.
     double pathsPerSecond() const;
@@ -34,7 +34,7 @@ struct ProgressState {
 /// A request to stop after the chunk that is being rendered, unless it takes too long (sampling.h).
 struct StopRequest {
     std::string cause;  ///< For the report and the log: "SIGINT", "the caller".
-    int exit_code = 1;  ///< That a command returns which was stopped so.
+    int exit_code = 1;  ///< A command that is stopped in this way returns it.
 };
 
 /// The base class watches nothing and never stops.

@@ -61,7 +61,7 @@ public:
     std::vector<double> numbers(std::size_t how_many, const std::string& what) {
         // A number takes two bytes at least: a count that the file cannot hold takes no memory.
         if (how_many > (rest_.size() + text_.size() - at_) / 2 + 1)
-            fail(fmt::format("there should be {} {}s, and the file is too short for them", how_many, what));
+            fail(fmt::format("the file is too short for {} {}s", how_many, what));
         std::vector<double> all(how_many);
         for (std::size_t i = 0; i < how_many; ++i)
             all[i] = number(fmt::format("{} {} of {}", what, i + 1, how_many));
@@ -113,7 +113,7 @@ std::string_view tilt(IesText& text) {
         line.remove_prefix(begin + kTilt.size());
         return line.substr(0, line.find_last_not_of(" \t") + 1);
     }
-    text.fail("this is no IES file: there is no line 'TILT='");
+    text.fail("this is not an IES file: the line 'TILT=' is missing");
 }
 
 void requireIncreasing(const IesText& text, int line, const std::vector<double>& angles, const char* kind) {
@@ -237,7 +237,7 @@ IesProfile parseIes(std::string_view text_of_file, const std::string& name) {
         if (!(measured[i] >= 0) || !std::isfinite(measured[i]))
             text.fail(fmt::format("a candela value is {}; it must be 0 or more", measured[i]));
     }
-    if (!text.atEnd()) text.fail("there is more behind the last candela value; is a count too small?");
+    if (!text.atEnd()) text.fail("the file continues after the last candela value; is a count too small?");
     profile.horizontal_deg = columns.angles;
     for (const std::size_t column : columns.of)
         profile.candela.insert(profile.candela.end(),

@@ -102,8 +102,8 @@ std::vector<std::string> missingLight(const Scene& scene) {
     // Into a body, out of it, and a scattering behind it.
     if (found.bodies && found.scatters && scene.integrator.max_depth < 3)
         missing.push_back(
-            fmt::format("what surfaces behind a body of glass reflect, for which 'max_depth: "
-                        "{}' is too small",
+            fmt::format("reflections by surfaces behind a glass body, for which 'max_depth: {}' is too "
+                        "small",
                         scene.integrator.max_depth));
     return missing;
 }
@@ -111,10 +111,9 @@ std::vector<std::string> missingLight(const Scene& scene) {
 std::string missingLightText(const std::vector<std::string>& missing, const Scene& scene) {
     const char* remedy = lightsWithoutSize(scene).empty()
                              ? "raise 'max_depth'"
-                             : "an emitting sphere or disk in place of such a light, or a 'sun', is found";
+                             : "use an emitting sphere or disk instead of such a light, or a 'sun'";
     return fmt::format(
-        "the image lacks {}: no number of samples brings it, and the stated error does not "
-        "contain it; {}",
+        "the image lacks {}: more samples do not add it, and the stated error does not include it; {}",
         fmt::join(missing, "; "), remedy);
 }
 

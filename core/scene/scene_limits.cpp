@@ -92,7 +92,7 @@ std::string ExpansionLimit::refusal(std::uint64_t count, const std::string& thin
     const double needed = static_cast<double>(count) * static_cast<double>(bytes_each);
     if (needed <= static_cast<double>(bytes_)) return {};
     return fmt::format(
-        "written out, the scene has {} {}, which take {} of memory, and its files allow {}; set "
+        "expanded, the scene has {} {}, which need {} of memory, and the limit for its files is {}; set "
         "CRT_SCENE_MEMORY={}GB to allow it",
         count, things, bytesText(needed), bytesText(static_cast<double>(bytes_)), std::ceil(needed / 1e9));
 }
@@ -105,16 +105,17 @@ void checkRadiance(const Scene& scene) {
                             [](const Light& a, const Light& b) { return a.radiance < b.radiance; });
     if (!(brightest->radiance <= kMostRadiance))
         refuse(*brightest,
-               fmt::format("the {} of {} reaches {:g}, and single precision carries light up to {:g}",
+               fmt::format("the {} of {} reaches {:g}, and the largest value in single precision is {:g}",
                            brightest->quantity, brightest->name, brightest->radiance, kMostRadiance));
     if (brightest->radiance < kLeastRadiance)
         refuse(
             *brightest,
             fmt::format(
-                "{} is the brightest light, of {} {:g}, and single precision carries light from {:g}",
+                "the brightest light is {}, with a {} of {:g}, and the smallest value in single precision "
+                "is {:g}",
                 brightest->name, brightest->quantity, brightest->radiance, kLeastRadiance));
     if (dimmest->radiance < static_cast<double>(std::numeric_limits<float>::min()))
-        logWarning("{}: {} has a {} of {:g}, below single precision: it does not shine",
+        logWarning("{}: {} has a {} of {:g}, too small for single precision: it does not shine",
                    dimmest->place.text(), dimmest->name, dimmest->quantity, dimmest->radiance);
 }
 

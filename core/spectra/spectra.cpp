@@ -198,7 +198,7 @@ Spectrum tableSpectrum(const std::vector<double>& wavelength_nm, const std::vect
     if (outside == Outside::Error &&
         (wavelength_nm.front() > kWavelengthMin_nm || wavelength_nm.back() < kWavelengthMax_nm))
         fail(
-            fmt::format("a spectrum table covers {} to {} nm, not all of {} to {} nm; say 'outside: clamp' "
+            fmt::format("a spectrum table covers {} to {} nm, not all of {} to {} nm; add 'outside: clamp' "
                         "or 'outside: zero'",
                         wavelength_nm.front(), wavelength_nm.back(), kWavelengthMin_nm, kWavelengthMax_nm));
     if (outside == Outside::Zero && wavelength_nm.size() == 1)

@@ -32,7 +32,7 @@ void Board::close() {
 Board::Sight Board::waitBeyond(std::uint64_t version, std::chrono::milliseconds longest) {
     std::unique_lock lock(mutex_);
     looked_at_ = std::chrono::steady_clock::now();
-    // A version from before the program was started anew is none of ours.
+    // A version from before a restart of the program is not valid.
     news_.wait_for(lock, longest, [&] { return closed_ || version_ != version; });
     looked_at_ = std::chrono::steady_clock::now();
     return {version_, status_, picture_, closed_};

@@ -34,8 +34,8 @@ struct Picture {
     unsigned divisor = 1;            ///< As of Snapshot.
     std::uint64_t run = 0;           ///< As of Snapshot.
     CameraPose pose;                 ///< From where.
-    std::string plane;               ///< What it shows (planes.h).
-    std::string legend;              ///< What its colours stand for; empty: they are colours.
+    std::string plane;               ///< The plane to show (planes.h).
+    std::string legend;              ///< Meaning of its colours; empty: they are colours.
     std::vector<ColourScale> scales;
 };
 
@@ -44,14 +44,14 @@ struct ErrorPoint {
     double seconds = 0, samples = 0, error = 0, lower = 0, upper = 0;
 };
 
-/// What there is to say beside the picture.
+/// Notes next to the image.
 struct Status {
     std::string program;  ///< Another one each time that crt view starts.
     std::string file, title;
     std::string stage;  ///< Long work before samples: "reading bunny.obj". Empty: none.
     std::string
-        scene_error;  ///< Why the scene cannot be read as it is; the picture is of the last that could.
-    std::string render_error;           ///< Why nothing is rendered.
+        scene_error;  ///< Errors of the scene; the image shows its last version without errors.
+    std::string render_error;           ///< Reason why nothing is rendered.
     std::vector<std::string> warnings;  ///< Of the scene that is shown.
     std::string backend, device;
     std::uint32_t width = 0, height = 0;  ///< Of the film's crop window; 0: there is no scene yet.
@@ -66,15 +66,15 @@ struct Status {
     std::vector<std::string> whites;  ///< That can be chosen.
     std::string plane;
     std::vector<ErrorPoint> errors;  ///< Of this render, in order.
-    std::string tev;                 ///< What became of it; empty: it is not asked for.
+    std::string tev;                 ///< Its result; empty: it was not requested.
 };
 
 class Board {
 public:
-    /// Lets `change` change the status, and wakes whoever waits.
+    /// Lets `change` change the status, and wakes all waiting threads.
     void update(const std::function<void(Status&)>& change);
     void show(Picture picture);
-    /// From now on nobody waits any more.
+    /// Ends all waits, now and later.
     void close();
 
     struct Sight {
@@ -83,10 +83,10 @@ public:
         std::shared_ptr<const Picture> picture;  ///< Null: there is none yet.
         bool closed = false;
     };
-    /// What there is, once it is newer than `version`, or else after the time.
+    /// The state, once it is newer than `version`, or else after the time.
     Sight waitBeyond(std::uint64_t version, std::chrono::milliseconds longest);
     Sight now() { return waitBeyond(0, {}); }
-    /// Whether somebody has looked within the last seconds.
+    /// True if a page has requested the state within the last seconds.
     bool isWatched();
 
 private:

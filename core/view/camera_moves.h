@@ -1,4 +1,4 @@
-/// What a hand does to a camera: around the target, along the image, towards the target.
+/// Moves a camera by gestures: around the target, along the image, towards the target.
 #pragma once
 
 #include "scene/scene.h"

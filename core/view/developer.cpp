@@ -66,7 +66,7 @@ void Developer::run() {
         try {
             develop(snapshot, display);
         } catch (const std::exception& error) {
-            logWarning("the picture is not shown: {}", error.what());
+            logWarning("the image cannot be shown: {}", error.what());
         }
         lock.lock();
     }

@@ -44,7 +44,7 @@ private:
     bool stopping_ = false;
 
     // Of the thread.
-    std::uint64_t run_ = 0;  ///< Whose errors the board has.
+    std::uint64_t run_ = 0;  ///< The film whose errors the state has.
     double estimate_seconds_ = 0;
     std::optional<Stopwatch> estimated_;  ///< Since then.
     std::jthread thread_;                 ///< Last: it uses all others.

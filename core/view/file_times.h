@@ -1,4 +1,4 @@
-/// Whether files have changed, by the time of their last change and their size.
+/// Detects changes of files by the time of their last change and their size.
 #pragma once
 
 #include <cstdint>
@@ -16,7 +16,7 @@ public:
     /// Notes how the files are now; of those that `earlier` has noted, what it noted.
     explicit FileTimes(const std::vector<std::string>& files, const FileTimes& earlier = {});
 
-    /// Whether one of them is another than it was noted to be: changed, gone, or there again.
+    /// True if one of them differs from its noted state: changed, gone, or there again.
     bool changed() const;
 
 private:

@@ -120,10 +120,10 @@ std::string refusal(std::uint16_t port, const std::string& host, const std::stri
     const std::array<std::string, 2> own{fmt::format("127.0.0.1:{}", port),
                                          fmt::format("localhost:{}", port)};
     if (host != own[0] && host != own[1])
-        return "this address is not the one that crt view listens at: open the one that it prints";
-    if (!origin.empty() && origin != "http://" + host) return "pages of other sites are not answered";
+        return "crt view does not listen at this address: open the address that it prints";
+    if (!origin.empty() && origin != "http://" + host) return "requests from other sites are refused";
     if (!sameText(given_token, token))
-        return "the token is missing or another: open the address that crt view prints";
+        return "the token is missing or wrong: open the address that crt view prints";
     return {};
 }
 
@@ -132,7 +132,7 @@ struct HttpServer::Listening {
     tcp::acceptor acceptor{context};
 };
 
-/// A stream with a context of its own: its thread waits for it, and for how long is known.
+/// A stream with a separate context: its thread waits for it, with a known limit.
 class HttpServer::Connection {
 public:
     tcp::socket& socket() { return stream_.socket(); }
@@ -180,7 +180,7 @@ HttpServer::HttpServer(std::uint16_t port, std::string token,
     if (!error) acceptor.listen(asio::socket_base::max_listen_connections, error);
     if (error)
         throw Error(ErrorKind::Usage,
-                    fmt::format("port {} cannot be used: {}; without --port a free one is taken", port,
+                    fmt::format("port {} is not available: {}; without --port crt uses a free one", port,
                                 error.message()));
     acceptor.native_non_blocking(true);
     port_ = acceptor.local_endpoint().port();

@@ -1,5 +1,5 @@
-/// HTTP on 127.0.0.1, for pages of this program alone: who does not know the token, or comes from another
-/// site, is refused.
+/// HTTP on 127.0.0.1, for pages of this program alone: requests without the token, or from another site, are
+/// refused.
 #pragma once
 
 #include <chrono>
@@ -30,12 +30,13 @@ struct HttpReply {
     std::map<std::string, std::string> headers{};
 };
 
-/// Letters and digits that nobody guesses.
+/// Random letters and digits.
 std::string randomToken();
 
-/// Why a request is not answered; empty when it is. `host` and `origin` are its headers, the latter empty
-/// where there is none. A page of another site that a browser shows can send requests here, and a name that
-/// somebody gives to 127.0.0.1 makes such a page ours (DNS rebinding): hence both are looked at.
+/// Reason why a request is refused; empty if it is accepted. `host` and `origin` are its headers, the latter
+/// empty where there is none. A page of another site that a browser shows can send requests here, and a
+/// domain name that points to 127.0.0.1 gives such a page the same origin (DNS rebinding): hence both are
+/// checked.
 std::string refusal(std::uint16_t port, const std::string& host, const std::string& origin,
                     const std::string& token, const std::string& given_token);
 
@@ -62,12 +63,12 @@ private:
 
     bool isStopping();
     void accept();
-    /// Waits until somebody connects, speaks or has been silent for too long, and does what that takes.
+    /// Waits for a connection, data or a timeout, and handles it.
     void acceptSome();
     int pollTime() const;
     void serveThoseWhoSpeak();
     void takeNew();
-    /// Serves it on a thread of its own, which takes the descriptor. False: there is no room for a thread.
+    /// Serves it on a separate thread, which owns the descriptor. False: there is no room for a thread.
     bool start(Silent& silent);
     /// Interrupts the oldest connection that has shown no token, where there are too many, and waits a
     /// moment until one is closed.

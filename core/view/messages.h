@@ -1,4 +1,4 @@
-/// What pages and the program say to each other, as JSON.
+/// Messages between pages and the program, as JSON.
 #pragma once
 
 #include "view/board.h"
@@ -11,13 +11,13 @@
 
 namespace crt {
 
-/// What a page asks for at once: all of it or, where it is refused, nothing. Lengths of gestures are parts
-/// of the image: (0, 0) is its upper left corner, (1, 1) the lower right.
+/// The changes in one request of a page: all of them are applied or, if one is refused, none. Lengths of
+/// gestures are parts of the image: (0, 0) is its upper left corner, (1, 1) the lower right.
 struct ViewChange {
     std::optional<std::array<double, 2>> orbit;  ///< To the right, upwards. Radians.
     std::optional<std::array<double, 2>> pan;    ///< To the right, upwards.
     std::optional<double> dolly;                 ///< Factor on the distance to the target.
-    std::optional<std::array<double, 2>> focus;  ///< Where the surface is that shall be sharp.
+    std::optional<std::array<double, 2>> focus;  ///< Place of the surface that shall be in focus.
     std::optional<double> fov_deg;               ///< As of fovOf_deg().
     std::optional<double> zoom;                  ///< Factor on the size of the image.
     bool reset_camera = false;                   ///< To the scene's.
@@ -32,7 +32,7 @@ struct ViewChange {
 /// The changes of a request, in order. One that cannot be read leaves the others as they are.
 struct RequestedChange {
     ViewChange change;
-    std::string refusal;  ///< Why it cannot be read; empty: it can.
+    std::string refusal;  ///< Errors of the scene; empty: none.
 };
 
 /// An object is one change, a list several. Throws crt::Error(Usage) for text that is neither. A change is

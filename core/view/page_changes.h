@@ -1,4 +1,5 @@
-/// Which changes of each page were taken. Pages number their changes and send again those whose reply was
+/// Records the changes of each page that were applied. Pages number their changes and send again those whose
+/// reply was
 /// lost: each counts once, in order.
 #pragma once
 

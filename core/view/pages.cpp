@@ -104,7 +104,7 @@ HttpReply answerPage(Viewer& viewer, const HttpRequest& request) {
     if (what == "GET /devices") return {.type = kJson, .body = viewer.devices()};
     if (what == "GET /image.exr") return download(viewer.exr(), "image/x-exr");
     if (what == "GET /image.png") return download(viewer.png(), "image/png");
-    return {.status = 404, .body = "there is nothing here\n"};
+    return {.status = 404, .body = "no such page\n"};
 }
 
 }  // namespace crt

@@ -232,8 +232,8 @@ Development developmentFor(const Display& display, const Scene& scene) {
         const std::string hint = didYouMean(white, whiteNames(scene));
         throw Error(
             ErrorKind::Usage,
-            fmt::format("the scene has no white '{}'; {}", white,
-                        hint.empty() ? "there are its lights, illuminants, and 1000 K to 40000 K" : hint));
+            fmt::format("the scene has no light '{}' for white balance; {}", white,
+                        hint.empty() ? "use one of its lights, an illuminant, or 1000 K to 40000 K" : hint));
     }
     return development;
 }
@@ -242,7 +242,7 @@ Picture pictureOf(const Snapshot& snapshot, const Display& display) {
     const Development shown = developmentFor(display, *snapshot.seen->read);
     if (aovsLacking(*snapshot.film, display.plane) != 0)
         throw Error(ErrorKind::Usage,
-                    fmt::format("the film does not hold '{}' yet: try again in a moment", display.plane));
+                    fmt::format("the film does not contain '{}' yet: try again in a moment", display.plane));
     const bool colours = display.plane == "image";
     const Image image =
         resolveImage(*snapshot.film, colours ? shown : shown.forFloats(), aovsOfPlane(display.plane));

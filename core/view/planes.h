@@ -12,7 +12,7 @@
 
 namespace crt {
 
-/// How a film is shown. No sample depends on it.
+/// Display settings of a film. No sample depends on it.
 struct Display {
     std::optional<double> exposure_ev;  ///< Instead of the scene's.
     std::string white = "scene";  ///< "scene", "none", a light of the scene, an illuminant, or "5000 K".
@@ -28,7 +28,7 @@ std::uint32_t aovsOfPlane(const std::string& plane);
 /// Those of them that only another film would hold.
 std::uint32_t aovsLacking(const Film& film, const std::string& plane);
 
-/// What Display::white can be beside temperatures.
+/// Possible values of Display::white besides temperatures.
 std::vector<std::string> whiteNames(const Scene& scene);
 /// The scene's development with what the display changes. Throws crt::Error(Usage) for a white that is none.
 Development developmentFor(const Display& display, const Scene& scene);

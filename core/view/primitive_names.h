@@ -1,4 +1,4 @@
-/// What the author of a scene calls the surface behind a primitive id of a film.
+/// The name in the scene of the surface behind a primitive id of a film.
 #pragma once
 
 #include "compile/compile.h"
@@ -12,7 +12,7 @@ namespace crt {
 
 struct PrimitiveName {
     std::string object;    ///< Empty: the object has no name.
-    std::string material;  ///< Empty: it has no material of its own.
+    std::string material;  ///< Empty: it has no separate material.
 };
 
 /// Keeps what it needs of both: neither need outlive it.

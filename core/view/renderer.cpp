@@ -99,7 +99,7 @@ void Renderer::run() {
     }
 }
 
-/// Whatever went wrong, the next wish begins anew.
+/// After any error the next request starts from the beginning.
 void Renderer::recover(const std::string& what) {
     failed_ = taken_;
     applied_.reset();
@@ -210,8 +210,8 @@ void Renderer::renderChunk(const RenderWishes& wanted, std::uint64_t count) {
                      [&](double) { cancelWhereStale(wanted); });
     if (devices_->inBands())
         throw Error(ErrorKind::Device,
-                    "the film has no room on the device as a whole, and a view of parts would be no view: "
-                    "'crt render' renders it in bands, and --set film.resolution makes it smaller");
+                    "the film does not fit on the device: reduce it with --set film.resolution, or use 'crt "
+                    "render', which renders it in bands");
     const double seconds = rendering.seconds();
     samples_ += count;
     seconds_ += seconds;

@@ -24,18 +24,18 @@
 
 namespace crt {
 
-/// What is to be rendered, by what.
+/// Scene and devices of a render.
 struct RenderWishes {
     std::shared_ptr<const Scene> scene;  ///< Null: nothing yet.
     CameraPose pose;
-    std::uint32_t aovs = 0;     ///< That the film shall hold.
+    std::uint32_t aovs = 0;     ///< AOVs that the film shall hold.
     std::uint64_t samples = 0;  ///< Per pixel; 0: the scene's number.
     bool paused = false;
     std::string backend = "auto";
     IntegratorOptions integrator;
 
     std::uint64_t samplesWanted() const { return samples > 0 ? samples : scene->sampler.samples; }
-    /// Whether the same samples of the same film answer both.
+    /// True if the same samples of the same film satisfy both.
     bool samePicture(const RenderWishes& other) const;
     bool sameDevice(const RenderWishes& other) const;
 };
@@ -82,7 +82,7 @@ private:
     // Of the thread.
     std::uint64_t taken_ = 0;              ///< The revision that is worked on.
     std::optional<std::uint64_t> failed_;  ///< The revision that went wrong: it is not tried again.
-    std::optional<RenderWishes> applied_;  ///< What the film on the devices is of; nothing: there is none.
+    std::optional<RenderWishes> applied_;  ///< The request whose film is on the devices; nothing: none.
     std::unique_ptr<Session> session_;
     std::optional<CompiledScene> compiled_;
     std::shared_ptr<const Scene> compiled_of_;

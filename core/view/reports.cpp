@@ -119,7 +119,7 @@ std::string bytesFrom(const std::string& name, const std::function<void(const st
 
 void requireWhole(const Snapshot& snapshot) {
     if (snapshot.divisor > 1)
-        throw Error(ErrorKind::Usage, "the picture is still a small preview: try again in a moment");
+        throw Error(ErrorKind::Usage, "the image is still a small preview: try again in a moment");
 }
 
 /// "room_64spp.png"

@@ -14,8 +14,8 @@ namespace crt {
 /// one outside it.
 std::string pixelJson(const Snapshot& snapshot, std::uint32_t x, std::uint32_t y);
 
-/// How far the surface is along the ray through a place of the crop window, (0, 0) to (1, 1); nothing where
-/// there is none, or the film does not know.
+/// Distance of the surface along the ray through a place of the crop window, (0, 0) to (1, 1); nothing if
+/// there is no surface, or the film lacks the distance.
 std::optional<double> depthAt(const Snapshot& snapshot, double x, double y);
 
 /// A file that a browser saves.
@@ -30,7 +30,7 @@ SavedFile exrOf(const Snapshot& snapshot, const std::string& stem);
 /// Throws as exrOf(), and for a plane that the film does not hold yet.
 SavedFile pngOf(const Snapshot& snapshot, const Display& display, const std::string& stem);
 
-/// What `crt plugins` lists, as JSON.
+/// The output of `crt plugins`, as JSON.
 std::string devicesJson();
 
 }  // namespace crt

@@ -72,7 +72,7 @@ void SceneSource::read(std::vector<std::string>& files) {
     } catch (const std::exception& error) {
         what = error.what();
     }
-    // What the last good scene was made of, and where the errors are.
+    // The files of the last valid scene, and those with the errors.
     for (std::string& file : filesNamedIn(what))
         if (std::find(files.begin(), files.end(), file) == files.end()) files.push_back(std::move(file));
     logMessage(LogLevel::Error, what);

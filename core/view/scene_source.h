@@ -16,8 +16,8 @@ namespace crt {
 
 class SceneSource {
 public:
-    /// `take` gets each scene that could be read, on the source's thread. What is wrong with one that could
-    /// not is on the board until one can.
+    /// `take` gets each scene that could be read, on the source's thread. The errors of an invalid scene
+    /// stay in the state until a valid one is read.
     SceneSource(SceneRequest request, Board& board, std::function<void(std::shared_ptr<const Scene>)> take);
     ~SceneSource();
     SceneSource(const SceneSource&) = delete;

@@ -60,7 +60,7 @@ bool hasDesktop() {
     return is_set("DISPLAY") || is_set("WAYLAND_DISPLAY");
 }
 
-/// False: there is no xdg-open. What a browser says of itself belongs into nobody's terminal.
+/// False: there is no xdg-open. The messages of a browser about itself do not belong in the terminal.
 bool openInBrowser(const std::string& address, const sigset_t& signals) {
     posix_spawn_file_actions_t files;
     posix_spawn_file_actions_init(&files);
@@ -99,7 +99,8 @@ std::filesystem::path privateParent() {
     return std::filesystem::temp_directory_path();
 }
 
-/// Reading a large scene cannot be cancelled, and there is nothing to save: who still works then is left.
+/// Reading a large scene cannot be cancelled, and there is nothing to save: a thread that still works then
+/// is left.
 void leaveSoon() {
     std::thread([] {
         constexpr std::chrono::milliseconds kPatience{600};
@@ -126,7 +127,7 @@ void serveView(const ViewOptions& view, const ServeOptions& serve) {
         opened = openInBrowser("file://" + folder->write("view.html", pageThatLeadsTo(address)),
                                signals.before());
     }
-    logInfo("{}; Ctrl-C ends it",
+    logInfo("{}; press Ctrl-C to stop",
             opened ? "the view is in the browser" : "open the address above in a browser");
     signals.wait();
     leaveSoon();

@@ -1,4 +1,4 @@
-/// While it lives, no message of this thread reaches anybody.
+/// Drops all messages of this thread during its lifetime.
 #pragma once
 
 #include "base/listener.h"

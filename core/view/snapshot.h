@@ -1,4 +1,4 @@
-/// What a render hands to whoever makes pictures of it: a film that does not change any more.
+/// A film that no longer changes, which a render hands to the makers of images.
 #pragma once
 
 #include "film/error_estimate.h"

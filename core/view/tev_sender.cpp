@@ -188,7 +188,7 @@ void TevSender::run() {
             failure = error.what();
             connection_.reset();
             width_ = height_ = 0;
-            tell(fmt::format("tev at {}:{} is not reached: {}", address_.host, address_.port, failure));
+            tell(fmt::format("tev at {}:{} cannot be reached: {}", address_.host, address_.port, failure));
         }
         lock.lock();
         if (failure.empty()) continue;

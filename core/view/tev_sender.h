@@ -15,7 +15,7 @@
 
 namespace crt {
 
-/// Where tev listens.
+/// Address at which tev listens.
 struct TevAddress {
     std::string host, port;
 };
@@ -28,7 +28,8 @@ std::vector<std::uint8_t> tevCreateImage(const std::string& name, std::uint32_t 
 std::vector<std::uint8_t> tevUpdateImage(const std::string& name, std::uint32_t width, std::uint32_t height,
                                          const std::vector<float>& rgb);
 
-/// On a thread of its own: the newest film, as fast as tev takes it. A tev that is not there is tried again.
+/// Sends the newest film on a separate thread, as fast as tev takes it. A tev that is not there is tried
+/// again.
 class TevSender {
 public:
     TevSender(TevAddress address, std::string image_name, Board& board);

@@ -29,7 +29,8 @@ std::unique_ptr<TevSender> tevOf(const ViewOptions& options, Board& board) {
     return std::make_unique<TevSender>(*options.tev, name, board);
 }
 
-/// What each film holds: which surface a pixel shows, and how far it is where a lens can be focused on it.
+/// AOVs that each film holds: the surface that a pixel shows, and its distance if a lens can be focused on
+/// it.
 std::uint32_t basicAovs(const Scene& scene) {
     return kAovPrimitive | (scene.camera.aperture_radius > 0 ? kAovDepth : 0u);
 }
@@ -87,7 +88,8 @@ void Viewer::takeScene(std::shared_ptr<const Scene> scene) {
     const std::vector<std::string> whites = whiteNames(*scene_);
     const bool kelvin = display.white.ends_with(" K");
     if (!kelvin && std::find(whites.begin(), whites.end(), display.white) == whites.end()) {
-        logWarning("the scene has no white '{}' any more: it is shown with its own", display.white);
+        logWarning("the scene no longer has the light '{}': the image uses the scene's own white balance",
+                   display.white);
         display.white = "scene";
         developer_.setDisplay(display);
     }
@@ -144,8 +146,8 @@ void Viewer::changeOnce(const ViewChange& change) {
 
 namespace {
 
-/// Throws for a camera so much nearer to its target, or farther from it, than the scene's own that its
-/// directions would be rounding.
+/// Throws for a camera so close to its target, or so far from it, compared with the scene's own camera, that
+/// its directions would be rounding errors.
 void requireReach(const CameraPose& pose, const Camera& camera) {
     constexpr double kMost = 1e9;
     const double own = length(camera.target - camera.position), now = length(pose.target - pose.position),
@@ -171,7 +173,7 @@ CameraPose Viewer::poseAfter(const ViewChange& change) const {
 /// The focus distance that makes what lies there sharp.
 double Viewer::focusAt(const std::array<double, 2>& place) const {
     if (scene_->camera.aperture_radius <= 0)
-        throw Error(ErrorKind::Usage, "the camera is a pinhole, to which all is sharp: it has no aperture");
+        throw Error(ErrorKind::Usage, "the camera is a pinhole without an aperture: everything is in focus");
     const std::optional<Snapshot> now = developer_.newest();
     const std::optional<double> distance = now ? depthAt(*now, place[0], place[1]) : std::nullopt;
     if (!distance) throw Error(ErrorKind::Usage, "there is no surface to focus on");
@@ -225,16 +227,16 @@ void Viewer::tellSettings(const RenderWishes& wishes) {
 
 std::string Viewer::pixel(std::uint32_t x, std::uint32_t y) const {
     const std::optional<Snapshot> now = developer_.newest();
-    if (!now) throw Error(ErrorKind::Usage, "there is no picture yet");
+    if (!now) throw Error(ErrorKind::Usage, "there is no image yet");
     return pixelJson(*now, x, y);
 }
 
 Snapshot Viewer::filmOfView() const {
     const std::optional<Snapshot> now = developer_.newest();
-    if (!now) throw Error(ErrorKind::Usage, "there is no picture yet");
+    if (!now) throw Error(ErrorKind::Usage, "there is no image yet");
     const std::lock_guard lock(mutex_);
     if (now->seen->read != scene_ || !(now->seen->pose == pose_))
-        throw Error(ErrorKind::Usage, "the picture is still that of the view before: try again in a moment");
+        throw Error(ErrorKind::Usage, "the image still shows the previous view: try again in a moment");
     return *now;
 }
 

@@ -38,8 +38,8 @@ struct ChangeRequest {
 
 class Viewer {
 public:
-    /// Starts everything and returns at once. What the parts have to say goes to the pages and to the
-    /// listener of the calling thread.
+    /// Starts everything and returns at once. Messages of the parts go to the pages and to the listener of
+    /// the calling thread.
     explicit Viewer(const ViewOptions& options);
     ~Viewer();
     Viewer(const Viewer&) = delete;
@@ -51,7 +51,7 @@ public:
     /// Makes the changes in order, and those of a page that numbers them once, however often it sends them.
     /// Then throws crt::Error(Usage) if this scene or film cannot do some of them, which change nothing.
     void change(const ChangeRequest& request);
-    /// What the film knows of a pixel of the crop window, as JSON. Throws crt::Error(Usage).
+    /// Data of a pixel of the crop window, as JSON. Throws crt::Error(Usage).
     std::string pixel(std::uint32_t x, std::uint32_t y) const;
     /// The image, and the picture as it is shown, as files. Throws crt::Error, with Usage while the newest
     /// film is not one of the present view.
@@ -79,7 +79,7 @@ private:
     Listener listener_;
     const ListenerScope scope_;
 
-    mutable std::mutex mutex_;  ///< Of what follows.
+    mutable std::mutex mutex_;  ///< Guards the members below.
     std::shared_ptr<const Scene> scene_;
     CameraPose pose_;
     std::uint32_t aovs_ = 0;  ///< That were looked at.
@@ -91,7 +91,7 @@ private:
     std::string devices_;
 
     // In the order of the data; each is gone before those that it hands on to.
-    const std::unique_ptr<TevSender> tev_;  ///< Null: nobody asked for it.
+    const std::unique_ptr<TevSender> tev_;  ///< Null: not requested.
     Developer developer_;
     Renderer renderer_;
     SceneSource source_;

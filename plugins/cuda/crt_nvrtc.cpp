@@ -9,8 +9,8 @@
 int main() {
     if (::isatty(STDIN_FILENO) != 0 || ::isatty(STDOUT_FILENO) != 0) {
         std::fputs(
-            "crt_nvrtc compiles kernels for crt's CUDA backend, which "
-            "starts it by itself; there is nothing to type here\n",
+            "crt_nvrtc compiles kernels for crt's CUDA backend, which starts it when needed; do not run it "
+            "by hand\n",
             stderr);
         return 2;
     }

@@ -67,7 +67,7 @@ public:
             const ssize_t n = ::write(descriptor, bytes_.data() + done, bytes_.size() - done);
             if (n < 0 && errno == EINTR) continue;
             if (n <= 0)
-                throw std::runtime_error(std::string("cannot write to the compiler's process: ") +
+                throw std::runtime_error(std::string("cannot write to the compiler process: ") +
                                          std::strerror(errno));
             done += static_cast<std::size_t>(n);
         }
@@ -77,14 +77,14 @@ public:
     static Message readFrom(int descriptor) {
         struct stat status {};
         if (::fstat(descriptor, &status) != 0)
-            throw std::runtime_error("the compiler's process cannot be heard");
+            throw std::runtime_error("the output of the compiler process cannot be read");
         Message message;
         message.bytes_.resize(static_cast<std::size_t>(status.st_size));
         for (std::size_t done = 0; done < message.bytes_.size();) {
             const ssize_t n = ::pread(descriptor, message.bytes_.data() + done, message.bytes_.size() - done,
                                       static_cast<off_t>(done));
             if (n < 0 && errno == EINTR) continue;
-            if (n <= 0) throw std::runtime_error("the compiler's process cannot be heard");
+            if (n <= 0) throw std::runtime_error("the output of the compiler process cannot be read");
             done += static_cast<std::size_t>(n);
         }
         return message;
@@ -92,11 +92,11 @@ public:
     std::vector<unsigned char> next() {
         std::uint64_t length = 0;
         if (bytes_.size() - taken_ < sizeof length)
-            throw std::runtime_error("the compiler's process gave half an answer");
+            throw std::runtime_error("the output of the compiler process is incomplete");
         std::memcpy(&length, bytes_.data() + taken_, sizeof length);
         taken_ += sizeof length;
         if (bytes_.size() - taken_ < length)
-            throw std::runtime_error("the compiler's process gave half an answer");
+            throw std::runtime_error("the output of the compiler process is incomplete");
         const auto begin = bytes_.begin() + static_cast<std::ptrdiff_t>(taken_);
         taken_ += length;
         return {begin, begin + static_cast<std::ptrdiff_t>(length)};
@@ -110,7 +110,7 @@ public:
         const std::vector<unsigned char> bytes = next();
         Number number{};
         if (bytes.size() != sizeof number)
-            throw std::runtime_error("the compiler's process is of another version");
+            throw std::runtime_error("the compiler process has another version");
         std::memcpy(&number, bytes.data(), sizeof number);
         return number;
     }
@@ -128,7 +128,7 @@ private:
 int sharedMemory(const char* name) {
     const int descriptor = ::memfd_create(name, MFD_CLOEXEC);
     if (descriptor < 0)
-        throw std::runtime_error(std::string("no memory to share with the compiler's process: ") +
+        throw std::runtime_error(std::string("no shared memory for the compiler process: ") +
                                  std::strerror(errno));
     return descriptor;
 }
@@ -214,7 +214,7 @@ CompileProcess::~CompileProcess() {
 }
 
 std::optional<CompiledKernel> CompileProcess::poll() {
-    if (process_ < 0) throw std::runtime_error("the compiler's process was asked again");
+    if (process_ < 0) throw std::runtime_error("the compiler process is already in use");
     int status = 0;
     const pid_t ended = ::waitpid(process_, &status, WNOHANG);
     if (ended == 0) return std::nullopt;
@@ -222,7 +222,7 @@ std::optional<CompiledKernel> CompileProcess::poll() {
     leaveBehind(-1);
     // A host that ignores SIGCHLD has no status to ask for: then the answer alone tells.
     if (ended > 0 && WIFSIGNALED(status))
-        throw std::runtime_error("the compiler's process was ended by signal " +
+        throw std::runtime_error("the compiler process was ended by signal " +
                                  std::to_string(WTERMSIG(status)));
     Message message = Message::readFrom(answer_);
     const std::string failure = message.nextText();

@@ -56,8 +56,8 @@ Driver openDriver() {
         throw PluginError(CRT_NO_DEVICE, "the NVIDIA driver is installed but sees no GPU");
     if (started == CUDA_ERROR_STUB_LIBRARY)
         throw PluginError(CRT_NO_DEVICE,
-                          "no NVIDIA driver is installed: the libcuda.so.1 that was found is the toolkit's, "
-                          "which is only there to be linked with");
+                          "no NVIDIA driver is installed: the libcuda.so.1 that was found is the toolkit's "
+                          "stub, which is meant for linking only");
     if (started != CUDA_SUCCESS) {
         const char* text = nullptr;
         driver.cuGetErrorString(started, &text);
@@ -72,7 +72,7 @@ Driver openDriver() {
 
 int attribute(CUdevice device, CUdevice_attribute what) {
     int value = 0;
-    driver().check(driver().cuDeviceGetAttribute(&value, what, device), "asking a device's properties");
+    driver().check(driver().cuDeviceGetAttribute(&value, what, device), "querying a device's properties");
     return value;
 }
 
@@ -86,10 +86,10 @@ std::vector<Device> listDevices() {
         device.index = static_cast<std::uint32_t>(index);
         cuda.check(cuda.cuDeviceGet(&device.id, index), "opening CUDA device " + std::to_string(index));
         char name[128] = "";
-        cuda.check(cuda.cuDeviceGetName(name, sizeof name, device.id), "asking a device's name");
+        cuda.check(cuda.cuDeviceGetName(name, sizeof name, device.id), "querying a device's name");
         device.name = name;
         std::size_t bytes = 0;
-        cuda.check(cuda.cuDeviceTotalMem(&bytes, device.id), "asking a device's memory");
+        cuda.check(cuda.cuDeviceTotalMem(&bytes, device.id), "querying a device's memory");
         device.memory_bytes = bytes;
         device.multiprocessors =
             static_cast<std::uint32_t>(attribute(device.id, CU_DEVICE_ATTRIBUTE_MULTIPROCESSOR_COUNT));
@@ -177,7 +177,7 @@ namespace {
 
 void requireFree(std::uint64_t bytes, const Device& device, const char* what) {
     std::size_t free_bytes = 0, all_bytes = 0;
-    driver().check(driver().cuMemGetInfo(&free_bytes, &all_bytes), "asking for free memory");
+    driver().check(driver().cuMemGetInfo(&free_bytes, &all_bytes), "querying free memory");
     if (bytes > free_bytes) refuseFor(bytes, free_bytes, all_bytes, device, what);
 }
 

@@ -133,7 +133,7 @@ std::uint32_t CudaIntegrator::ensureSlices(std::uint32_t slices) {
     // Others may have taken memory since the device was opened. Slices only make a render faster: it must
     // not fail for want of them.
     std::size_t free_bytes = 0, all_bytes = 0;
-    driver().check(driver().cuMemGetInfo(&free_bytes, &all_bytes), "asking for free memory");
+    driver().check(driver().cuMemGetInfo(&free_bytes, &all_bytes), "querying free memory");
     const std::uint64_t film_bytes = std::max<std::uint64_t>(film_.bytes(), 1);
     const std::uint64_t affordable =
         plugin::sliceBudget(device_.memory_bytes, free_bytes + slices_.bytes()) / film_bytes;
@@ -146,7 +146,7 @@ std::uint32_t CudaIntegrator::ensureSlices(std::uint32_t slices) {
     } catch (const plugin::PluginError& error) {
         // Somebody was faster, or what is free lies in pieces.
         if (error.status() != CRT_OUT_OF_MEMORY) throw;
-        host_.log(CRT_LOG_DEBUG, std::string("cuda: going on without slices: ") + error.what());
+        host_.log(CRT_LOG_DEBUG, std::string("cuda: continuing without slices: ") + error.what());
         return 1;
     }
     slice_count_ = slices;
@@ -218,7 +218,7 @@ double CudaIntegrator::launch(const Launch& launch) {
     } catch (const plugin::PluginError& error) {
         // Waves only make a render faster: it must not fail for want of memory for them.
         if (error.status() != CRT_OUT_OF_MEMORY || !wavefront_ || wavefront_->bytes() != 0) throw;
-        program_->giveUp(std::string("going on with the precompiled kernel: ") + error.what());
+        program_->giveUp(std::string("continuing with the precompiled kernel: ") + error.what());
         launchKernels(program_->current(), launch);
     }
     noteMemory();

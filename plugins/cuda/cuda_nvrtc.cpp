@@ -72,7 +72,7 @@ Nvrtc Nvrtc::open(const std::vector<std::string>& candidates) {
         int count = 0;
         if (!complete || nvrtc.nvrtcVersion_(&nvrtc.major_, &nvrtc.minor_) != NVRTC_SUCCESS ||
             nvrtc.nvrtcGetNumSupportedArchs_(&count) != NVRTC_SUCCESS) {
-            refusals = path + " is too old: CUDA 11.2 is the least";
+            refusals = path + " is too old: CUDA 11.2 or newer is needed";
             continue;
         }
         loadBuiltins(path, nvrtc.major_, nvrtc.minor_);
@@ -117,9 +117,9 @@ Cubin Nvrtc::compile(const std::string& text, const std::string& file,
                                  "):\n" + firstLines(cubin.log, 20));
 
     std::size_t size = 0;
-    check(nvrtcGetCUBINSize_(owner.program, &size), "tell the size of the kernel");
+    check(nvrtcGetCUBINSize_(owner.program, &size), "return the size of the kernel");
     cubin.bytes.resize(size);
-    check(nvrtcGetCUBIN_(owner.program, reinterpret_cast<char*>(cubin.bytes.data())), "give the kernel");
+    check(nvrtcGetCUBIN_(owner.program, reinterpret_cast<char*>(cubin.bytes.data())), "return the kernel");
     return cubin;
 }
 

@@ -52,11 +52,11 @@ Module::Module(const void* image, const KernelSpec& spec, std::string name)
 
         int registers = 0, local_bytes = 0, blocks = 0;
         cuda.check(cuda.cuFuncGetAttribute(&registers, CU_FUNC_ATTRIBUTE_NUM_REGS, kernel_),
-                   "asking for registers");
+                   "querying registers");
         cuda.check(cuda.cuFuncGetAttribute(&local_bytes, CU_FUNC_ATTRIBUTE_LOCAL_SIZE_BYTES, kernel_),
-                   "asking for local memory");
+                   "querying local memory");
         cuda.check(cuda.cuOccupancyMaxActiveBlocksPerMultiprocessor(&blocks, kernel_, kBlock, 0),
-                   "asking for the occupancy");
+                   "querying the occupancy");
         // Local memory is the stacks of both traversals of the BVH, which are meant to be there, and what
         // did not fit into registers.
         constexpr int kTraversalStack = CRT_BVH_STACK * (sizeof(kernel::u64) + sizeof(kernel::u32));
@@ -108,10 +108,10 @@ CudaProgram::CudaProgram(const plugin::Host& host, const Device& device, std::ve
         compiler = &nvrtc();
     } catch (const std::runtime_error& error) {
         host_.log(CRT_LOG_INFO, std::string("cuda: ") + error.what() +
-                                    ": using the precompiled kernel with everything in");
+                                    ": using the precompiled kernel with all features");
     }
     if (compiler != nullptr && !compiler->supports(device.arch)) {
-        host_.log(CRT_LOG_INFO, "cuda: " + compiler->name() + " does not know '" + device.name +
+        host_.log(CRT_LOG_INFO, "cuda: " + compiler->name() + " does not support '" + device.name +
                                     "': using the precompiled kernel");
         compiler = nullptr;
     }
@@ -137,7 +137,7 @@ CudaProgram::CudaProgram(const plugin::Host& host, const Device& device, std::ve
             if (!pending_.empty()) std::this_thread::sleep_for(std::chrono::milliseconds(5));
         }
     } catch (const std::runtime_error& error) {
-        giveUp(std::string("using the precompiled kernel with everything in: ") + error.what());
+        giveUp(std::string("using the precompiled kernel with all features: ") + error.what());
     }
     if (!pending_.empty()) loadPrecompiled();
 }
@@ -214,7 +214,7 @@ const std::vector<Module>& CudaProgram::current() {
         try {
             poll();
         } catch (const std::exception& error) {
-            giveUp(std::string("going on with the precompiled kernel: ") + error.what());
+            giveUp(std::string("continuing with the precompiled kernel: ") + error.what());
         }
     }
     return lean_.empty() || !pending_.empty() ? precompiled_ : lean_;

@@ -34,7 +34,7 @@ std::uint32_t Wavefront::mostSlices(std::uint64_t blocks_across) const {
 std::uint64_t Wavefront::ensureSlots(std::uint64_t wanted, std::uint64_t least) {
     if (wanted <= slots_) return slots_;
     std::size_t free_bytes = 0, all_bytes = 0;
-    driver().check(driver().cuMemGetInfo(&free_bytes, &all_bytes), "asking for free memory");
+    driver().check(driver().cuMemGetInfo(&free_bytes, &all_bytes), "querying free memory");
     const std::uint64_t budget =
         std::min<std::uint64_t>(device_.memory_bytes / 16, (free_bytes + bytes()) / 2);
     wanted = std::max(std::min({wanted, budget / plan_.bytesPerSlot(row_count_), kMostSlots}), least);

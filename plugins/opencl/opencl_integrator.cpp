@@ -66,7 +66,7 @@ Buffer OpenClIntegrator::allocate(cl_mem_flags flags, std::uint64_t bytes, const
                                                  megabytes(device_.largest_buffer_bytes) + " in one buffer");
     if (allocated_bytes_ + bytes > device_.memory_bytes)
         throw PluginError(CRT_OUT_OF_MEMORY, std::string(what) + " needs " + megabytes(bytes) +
-                                                 " beside the " + megabytes(allocated_bytes_) +
+                                                 " in addition to the " + megabytes(allocated_bytes_) +
                                                  " in use, but '" + device_.name + "' has only " +
                                                  megabytes(device_.memory_bytes));
     cl_int result = CL_SUCCESS;
@@ -123,7 +123,7 @@ void OpenClIntegrator::setScene(const CrtSceneBlob& blob) {
         } catch (const PluginError& error) {
             // Waves only make a render faster: it must not fail for want of memory for them.
             if (error.status() != CRT_OUT_OF_MEMORY) throw;
-            host_.log(CRT_LOG_DEBUG, std::string("opencl: going on without waves: ") + error.what());
+            host_.log(CRT_LOG_DEBUG, std::string("opencl: continuing without waves: ") + error.what());
             allocated_bytes_ = allocated;
         }
     }

@@ -45,7 +45,7 @@ std::vector<unsigned char> programBinary(cl_program program) {
     // One device, so one binary.
     std::size_t size = 0;
     check(clGetProgramInfo(program, CL_PROGRAM_BINARY_SIZES, sizeof size, &size, nullptr),
-          "asking for the size of the compiled kernel");
+          "querying the size of the compiled kernel");
     std::vector<unsigned char> binary(size);
     unsigned char* pointer = binary.data();
     if (size != 0)

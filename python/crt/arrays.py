@@ -129,7 +129,7 @@ def write_ply(path, positions, faces, normals=None, uvs=None):
     if faces.dtype.kind == "f":
         raise ValueError("faces of a mesh are indices, not floats")
     if faces.size and not (0 <= int(faces.min()) and int(faces.max()) < vertices):
-        raise ValueError(f"a face of a mesh names a vertex that is none of its {vertices}")
+        raise ValueError(f"a face of a mesh uses a vertex that is not among its {vertices}")
     header += [f"element face {len(faces)}", "property list uchar int vertex_indices", "end_header", ""]
 
     table = np.empty(vertices, fields)

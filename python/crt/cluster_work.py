@@ -215,7 +215,7 @@ class Work:
         self.count_threads()
         if not self.good:
             raise error
-        LOGGER.warning("samples %d-%d are rendered again, on another worker: %s", first, end, error)
+        LOGGER.warning("samples %d-%d are rendered again on another worker: %s", first, end, error)
         self.redone += 1
         self.missing.give_back(first, end)
         return False
@@ -320,7 +320,7 @@ def failure_of(future, what):
         return error
     if isinstance(error, KilledWorker):
         # Not to be tried again: where a scene takes more memory than workers have, it would end them all.
-        return Error(f"{what} ended every worker that tried them, as happens where memory is short: {error}",
+        return Error(f"{what} ended every worker that tried them; there may be too little memory: {error}",
                      Kind.BACKEND)
     hint = "; crt must be installed on every worker" if isinstance(error, ImportError) else ""
     return Error(f"a Dask worker fails with {type(error).__name__}: {error}{hint}", Kind.BACKEND)

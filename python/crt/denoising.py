@@ -55,8 +55,9 @@ class Denoised:
         if write is None:
             raise Error(f"a denoised image is saved as .exr or .png, and not as '{path.name}'", Kind.USAGE)
         if os.path.realpath(path) in self._measured or os.path.lexists(path) and mark_of(path) is None:
-            raise Error(f"'{path}' holds what was measured, or is no denoised image; it is left as it is. "
-                        f"Another name, such as '{path.with_suffix('')}.denoised{path.suffix}'?", Kind.USAGE)
+            raise Error(f"'{path}' holds the measured image, or is not a denoised image, so crt does not "
+                        f"replace it. Choose another name, such as "
+                        f"'{path.with_suffix('')}.denoised{path.suffix}'?", Kind.USAGE)
         try:
             with tempfile.TemporaryDirectory(dir=path.parent, prefix=".crt-denoised-") as folder:
                 written = pathlib.Path(folder, f"image{path.suffix}")
@@ -104,9 +105,9 @@ def denoise(result, *, aovs=None):
     names = [name for name in ("albedo", "normal") if name in film.aovs] if aovs is None else list(aovs)
     for name in names:
         if name not in ("albedo", "normal"):
-            raise Error(f"'{name}' does not guide the denoiser; albedo and normal do", Kind.USAGE)
+            raise Error(f"'{name}' cannot guide the denoiser; use albedo and normal", Kind.USAGE)
     if names == ["normal"]:
-        raise Error("the denoiser takes normals only beside albedo", Kind.USAGE)
+        raise Error("the denoiser takes normals only together with albedo", Kind.USAGE)
     return Denoised(film, planes(film, names), result.saved if isinstance(result, Result) else ())
 
 

@@ -83,7 +83,7 @@ def converge(scenes, output, *, backends=None, vary=None, references=(), time_li
     replicates  seeds of each, at least
     max_spp     no more samples a pixel
     resolution  longer side in pixels, where the scene's film.resolution was not set (128); 0: the scene's
-    resume      go on with the run in that folder, of the same experiment
+    resume      continue the run in that folder, with the same experiment
 
     Returns a Judgement, which has not passed when a backend is wrong; `figures` are the folder's manifest.
     """

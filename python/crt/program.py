@@ -20,7 +20,7 @@ def path():
     for place in [pathlib.Path(named)] if named else [here / "_tree/bin/crt", here.parents[1] / "bin/crt"]:
         if os.access(place, os.X_OK):
             return place
-    raise Error(f"the program crt is not where it should be: {place}", Kind.USAGE)
+    raise Error(f"the program crt is missing: {place}", Kind.USAGE)
 
 
 def file_argument(path):

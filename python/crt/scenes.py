@@ -254,7 +254,7 @@ def examples_folder():
     for place in [pathlib.Path(named)] if named else places:
         if place.is_dir():
             return place
-    raise Error(f"the scenes that come with crt are not where they should be: {place}", Kind.USAGE)
+    raise Error(f"the scenes that come with crt are missing: {place}", Kind.USAGE)
 
 
 def examples():
@@ -270,5 +270,5 @@ def example(name):
     if name not in known:
         near = difflib.get_close_matches(str(name), known, n=1)
         meant = f"; did you mean '{near[0]}'?" if near else f"; there are {', '.join(known)}"
-        raise Error(f"no scene '{name}' comes with crt{meant}", Kind.USAGE)
+        raise Error(f"crt has no example scene '{name}'{meant}", Kind.USAGE)
     return path

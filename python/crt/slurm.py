@@ -38,16 +38,19 @@ def parser():
     options.add_argument("scene", metavar="SCENE", help="a scene, or a model as crt MODEL takes it")
     add = options.add_argument
     add("--spp", type=count, metavar="N", help="samples per pixel, instead of the scene's")
-    add("--nodes", type=count, required=True, metavar="M", help="parts that run at the same time at most")
-    add("--parts", type=count, metavar="P", help="parts in all (M); more of them lose less with a node")
+    add("--nodes", type=count, required=True, metavar="M", help="maximum number of parts that run at the "
+                                                                "same time")
+    add("--parts", type=count, metavar="P", help="total number of parts (M); with more parts, a failed node "
+                                                 "loses less")
     add("-o", "--output", action="append", metavar="FILE", default=[],
         help="an image or a .crtfilm (SCENE.exr in this folder); repeatable")
-    add("--folder", metavar="DIR", help="where scripts, parts and logs go (SCENE.slurm in this folder)")
+    add("--folder", metavar="DIR", help="folder for scripts, parts and logs (SCENE.slurm in this folder)")
     add("--submit", action="store_true", help="run submit.sh too")
     slurm = options.add_argument_group("Slurm")
     add = slurm.add_argument
     add("--partition", metavar="NAME", help="of all jobs")
-    add("--time", metavar="TIME", help="of a part, as sbatch takes it; a part that needs more is requeued")
+    add("--time", metavar="TIME", help="time limit of a part, as sbatch takes it; a part that needs more is "
+                                       "requeued")
     add("--sbatch-option", action="append", metavar="OPTION", default=[],
         help="of a part, such as gres=gpu:1 or cpus-per-task=16; repeatable")
     add("--merge-option", action="append", metavar="OPTION", default=[],
@@ -60,7 +63,8 @@ def parser():
     add("--set", action="append", metavar="KEY=VALUE", default=[], help="change the scene; repeatable")
     add("--seed", metavar="N", help="another seed")
     add("--crop", metavar="X0,Y0,X1,Y1", help="only these pixels of the film")
-    add("--checkpoint-every", metavar="DURATION", default="2m", help="how often a part saves its film (2m)")
+    add("--checkpoint-every", metavar="DURATION", default="2m", help="interval at which a part saves its "
+                                                                     "film (2m)")
     return options
 
 
@@ -98,7 +102,7 @@ def written(options):
             raise Error(f"there is no folder '{os.path.dirname(output)}' for '{output}'", Kind.OUTPUT)
     samples = options.spp or load(scene).samples
     if not options.spp and any(change.startswith("sampler.samples=") for change in options.set):
-        raise Error("the number of samples is --spp here, not --set sampler.samples", Kind.USAGE)
+        raise Error("give the number of samples as --spp, not as --set sampler.samples", Kind.USAGE)
     spec = {"scene": scene, "samples": samples, "ranges": parts_of(samples, options.parts or options.nodes),
             "changes": changes}
     folder = pathlib.Path(absolute(options.folder or f"{stem}.slurm"))
@@ -127,7 +131,7 @@ def written(options):
 def absolute(path):
     """Without following links, whose names may be all that is the same on every node."""
     if "\n" in path:
-        raise Error("a path with a line break cannot stand in a script", Kind.USAGE)
+        raise Error("a script cannot contain a path with a line break", Kind.USAGE)
     return os.path.abspath(path)
 
 

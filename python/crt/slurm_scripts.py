@@ -92,7 +92,7 @@ jobs=$folder/jobs
 if [[ -e $jobs ]] && [[ -n $(squeue --noheader --states=all --format='%T' --jobs="$(cat -- "$jobs")" \
         2>/dev/null | grep -vE 'COMPLETED|FAILED|CANCELLED|TIMEOUT|NODE_FAIL|BOOT_FAIL|DEADLINE|OUT_OF_ME' \
         || true) ]]; then
-    echo "crt slurm: error: the jobs $(cat -- "$jobs") of this render are still there; scancel ends them" >&2
+    echo "crt slurm: error: the jobs $(cat -- "$jobs") of this render still exist; scancel ends them" >&2
     exit 2
 fi
 missing=()

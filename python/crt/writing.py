@@ -91,7 +91,7 @@ def to_text(content, remarks):
     """The scene with its meshes written out, for where there is no folder to put files into."""
     content = relative(content, pathlib.Path.cwd())
     if has_image(content):
-        raise Error("the scene holds images, which crt reads from files of their own: write the scene to a "
+        raise Error("the scene holds images, which crt reads from separate files: write the scene to a "
                     "file (crt import: -o FILE; Python: scene.save)", Kind.USAGE)
     return yaml(plain(content), remarks)
 
@@ -104,7 +104,7 @@ def to_file(content, remarks, path, overwrite):
     beside = path.with_name(path.stem + ".meshes")
     for there in (path, beside):
         if there.exists() and not overwrite:
-            raise Error(f"'{there}' exists already, and may have been changed by hand; --overwrite (Python: "
+            raise Error(f"'{there}' exists and may have been edited by hand; --overwrite (Python: "
                         "overwrite=True) replaces it", Kind.USAGE)
     try:
         with tempfile.TemporaryDirectory(prefix=f".{path.stem}-", dir=path.parent) as folder:

@@ -65,7 +65,7 @@ crt::Image develop(const crt::Film& film, bool for_display, std::optional<double
 
 nb::str describeError(const crt::ErrorEstimate& error) {
     return nb::str(
-               "<crt.ErrorEstimate {:.3g} % ({:.3g} to {:.3g} %) expected, of this image at most {:.3g} %>")
+               "<crt.ErrorEstimate {:.3g} % ({:.3g} to {:.3g} %) expected; this image: at most {:.3g} %>")
         .format(100 * error.relative_rmse, 100 * error.relative_rmse_lower, 100 * error.relative_rmse_upper,
                 100 * error.half_width_95);
 }
@@ -82,7 +82,7 @@ void bindFilm(nb::module_& module) {
 
     nb::class_<crt::ErrorEstimate>(
         module, "ErrorEstimate",
-        "What a film knows of its own error, relative to the mean luminance:\n"
+        "A film's estimate of its own error, relative to the mean luminance:\n"
         "relative_rmse with relative_rmse_lower and _upper is the expected error,\n"
         "over seeds, with its 95 % interval; half_width_95 is what the error of\n"
         "this image is at most, with a probability of 95 %.")
@@ -93,7 +93,7 @@ void bindFilm(nb::module_& module) {
         .def_ro("mean_luminance", &crt::ErrorEstimate::mean_luminance)
         .def("__repr__", &describeError);
     nb::class_<crt::Film>(module, "Film",
-                          "Sums of samples: what a render gives, and what images are made of.")
+                          "Sums of samples: the result of a render, from which images are made.")
         .def_static("load", &crt::Film::load, "path"_a, nb::call_guard<nb::gil_scoped_release>())
         .def("save", &crt::Film::save, "path"_a, nb::call_guard<nb::gil_scoped_release>())
         .def("__repr__", &describeFilm)
@@ -107,7 +107,7 @@ void bindFilm(nb::module_& module) {
         .def_prop_ro("counts", &countsOf, nb::rv_policy::automatic)
         .def_prop_ro("error", &crt::Film::error)
         .def("error_within", &crt::Film::errorWithin, "target"_a,
-             "Whether `crt render --target-error` would stop: half_width_95 is at most the target for all\n"
+             "True if `crt render --target-error` would stop: half_width_95 is at most the target for all\n"
              "pixels, and for the even and for the odd ones of a checkerboard.",
              nb::call_guard<nb::gil_scoped_release>())
         .def("develop", &develop, "for_display"_a = false, "exposure_ev"_a = nb::none(),

@@ -77,7 +77,7 @@ void bindRender(nb::module_& module) {
         .def_ro("driver", &crt::Device::driver)
         .def_ro("memory_bytes", &crt::Device::memory_bytes)
         .def("__repr__", &describeDevice);
-    nb::class_<crt::Plugin>(module, "Plugin", "A backend, and why it cannot run here where it cannot.")
+    nb::class_<crt::Plugin>(module, "Plugin", "A backend, and the reason if it cannot run here.")
         .def_ro("name", &crt::Plugin::name)
         .def_ro("path", &crt::Plugin::path)
         .def_ro("version", &crt::Plugin::version)

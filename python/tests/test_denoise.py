@@ -106,7 +106,7 @@ def test_what_was_measured_stays(oidn, tmp_path, box, ending):
 
 def test_what_cannot_be_done_is_said(oidn, tmp_path, box):
     film = crt.render(box, spp=4).film
-    for aovs, word in ((["albedo"], "albedo"), (["depth"], "depth"), (["normal"], "beside albedo")):
+    for aovs, word in ((["albedo"], "albedo"), (["depth"], "depth"), (["normal"], "together with albedo")):
         with pytest.raises(crt.Error, match=word) as raised:
             crt.denoise(film, aovs=aovs)
         assert raised.value.kind == crt.Kind.USAGE

@@ -90,7 +90,7 @@ def test_models_go_to_the_program(tmp_path):
 
 
 def test_other_files_are_refused():
-    with pytest.raises(crt.Error, match="no scene of Mitsuba") as caught:
+    with pytest.raises(crt.Error, match="is not a Mitsuba") as caught:
         crt.import_scene("scene.blend")
     assert caught.value.kind == crt.Kind.USAGE
 

@@ -286,7 +286,7 @@ def test_what_crt_lacks_is_listed_once_with_its_count(tmp_path):
 
 
 @pytest.mark.parametrize("text, line, column, phrase", [
-    ("<scene>\n  <shape\n</scene>", 3, 1, "this is no XML"),
+    ("<scene>\n  <shape\n</scene>", 3, 1, "this is not XML"),
     ("<scene>\n  <shap type='sphere'/></scene>", 2, 3, "did you mean 'shape'?"),
     ("<scene>\n <shape type='sphere'><float name='radius' value='big'/></shape></scene>", 2, 23, "'big'"),
     ("<scene><shape type='sphere'><float name='radius' value='nan'/></shape></scene>", 1, 29, "finite"),
@@ -295,7 +295,7 @@ def test_what_crt_lacks_is_listed_once_with_its_count(tmp_path):
     ("<scene><include filename='scene.xml'/></scene>", 1, 8, "includes itself"),
     ("<scene><shape type='sphere'><ref id='b'/></shape><bsdf type='diffuse' id='bb'/></scene>", 1, 29,
      "did you mean 'bb'?"),
-    ("<scene><bsdf type='twosided' id='a'><ref id='a'/></bsdf></scene>", 1, 8, "a part of itself"),
+    ("<scene><bsdf type='twosided' id='a'><ref id='a'/></bsdf></scene>", 1, 8, "contains itself"),
     ("<scene><integer name='x' value='$n'/></scene>", 1, 8, "-D n=VALUE"),
     ("<scene><sensor type='perspective'><film type='hdrfilm'><integer name='width' value='1000000000'/>"
      "</film></sensor></scene>", 1, 35, "65535"),

@@ -298,7 +298,8 @@ def test_what_failed_comes_first(verified, edited):
     cases = [name for name in page.ids if re.fullmatch(r"[A-Z]\d\d", name)]
     assert cases == [data["cases"][-1]["id"], *(case["id"] for case in data["cases"][:-1])]
     assert page.text.startswith("crt verify: FAILED")
-    assert page.text.index("one of the two cosines is missing") < page.text.index("How far answers lie")
+    assert page.text.index("one of the two cosines is missing") < page.text.index("Deviations from the "
+                                                                                  "expected results")
     asked = [row for row in page.rows if "asked" in row]
     assert asked[0]["verdict"].strip() == "FAIL" and asked[1]["asked"].strip() == "first"
     assert "1 FAIL" in page.text
@@ -401,14 +402,15 @@ def test_where_python_cannot_the_program_says_the_command(tmp_path):
     liar = tmp_path / "liar"
     liar.write_text("#!/bin/sh\necho 'crt: error: no library here' >&2\nexit 2\n")
     liar.chmod(0o755)
-    for python, why in (("", "as CRT_PYTHON asks"), ("/nowhere/python", "cannot start '/nowhere/python'"),
-                        (str(liar), "there is no page: no library here"),
+    for python, why in (("", "because CRT_PYTHON is empty"), ("/nowhere/python", "cannot start "
+                                                                                 "'/nowhere/python'"),
+                        (str(liar), "no page was made: no library here"),
                         ("/bin/false", "ended with code 1")):
         folder = tmp_path / "a folder"
         done = run_program("verify", "-b", BACKEND, "--case", "furnace", "-o", folder, python=python)
         assert why in done.stdout and not (folder / "verify.html").exists()
         assert (folder / "verify.json").exists()
-        typed = re.search(r"this makes it: (.*)$", done.stdout, re.MULTILINE)[1]
+        typed = re.search(r"this command makes it: (.*)$", done.stdout, re.MULTILINE)[1]
         assert typed.endswith(f"share/crt/report '{folder}'")
     # What it says works.
     said = typed.replace("/bin/false", sys.executable)

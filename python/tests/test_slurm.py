@@ -160,7 +160,7 @@ def test_real_slurm(folder):
         array, merge = (folder / "my box.slurm/jobs").read_text().strip().split(",")
         again = subprocess.run([folder / "my box.slurm/submit.sh"], env=cluster.environment, text=True,
                                capture_output=True)
-        assert again.returncode == 2 and "are still there" in again.stderr
+        assert again.returncode == 2 and "still exist" in again.stderr
 
         cluster.wait(lambda: (parts / "3.crtfilm").exists(), 900, "film of part 3")
         kill_program(parts / "3.crtfilm")

@@ -100,8 +100,8 @@ def gltf_cases(case):
         ("buffers/0/uri", "../../etc/passwd", "--allow-outside"),
         ("buffers/0/uri", "/etc/passwd", "--allow-outside"),
         ("buffers/0/uri", "%2e%2e/%2e%2e/etc/passwd", "--allow-outside"),
-        ("buffers/0/uri", "file:///etc/passwd", "crt follows no"),
-        ("buffers/0/uri", "https://example.org/a.bin", "crt follows no"),
+        ("buffers/0/uri", "file:///etc/passwd", "crt does not load"),
+        ("buffers/0/uri", "https://example.org/a.bin", "crt does not load"),
         ("buffers/0/uri", "none.bin", "none.bin"),
         ("buffers/0/uri", "data:application/octet-stream;base64,****", "base 64"),
         ("scenes/0/nodes", [5], "a.gltf"),
@@ -112,8 +112,8 @@ def gltf_cases(case):
         ("nodes/0/matrix", [0] * 15 + [7], "last row"),
         ("nodes/0/scale", [1e300, 1e300, 1e300], "a.gltf"),
         ("nodes/0/translation", [1, 2], "a.gltf"),
-        ("meshes/0/primitives/0/attributes", {}, "nothing to see"),
-        ("meshes/0/primitives/0/mode", 1, "nothing to see"),
+        ("meshes/0/primitives/0/attributes", {}, "nothing is visible"),
+        ("meshes/0/primitives/0/mode", 1, "nothing is visible"),
         ("meshes/0/primitives/0/mode", 99, "mode"),
         ("meshes/0/primitives/0/indices", 44, "a.gltf"),
         ("meshes/0/primitives/0/material", 3, "a.gltf"),
@@ -137,7 +137,7 @@ def gltf_cases(case):
     gltf("a material whose name is no text and that crt has not",
          changed(("materials", [{"name": "\x1b[2J", "extensions": {"KHR_materials_subsurface": {}}}]),
                  ("meshes/0/primitives/0/material", 0)), codes=0)
-    gltf("a scene without nodes", changed(("scenes/0/nodes", [])), "nothing to see")
+    gltf("a scene without nodes", changed(("scenes/0/nodes", [])), "nothing is visible")
     gltf("a light beyond the list", changed(("nodes/0/extensions/KHR_lights_punctual/light", 4)), "/light")
     gltf(
         "a texture beyond the list",
@@ -150,7 +150,7 @@ def gltf_cases(case):
     gltf(
         "light of 3e38",
         changed(("materials", [{"emissiveFactor": [3e38, 0, 0]}]), ("meshes/0/primitives/0/material", 0)),
-        "beyond any use",
+        "too large",
     )
 
 
@@ -199,8 +199,8 @@ def ply_cases(case, scene, endless_files):
     ply("version 2.0", replaced("ascii 1.0", "ascii 2.0"), "version 1.0")
     ply("an unknown format", replaced("ascii", "utf8"), "a.ply:2")
     ply("an unknown type", replaced("float x", "real x"), "'real'")
-    ply("a property before the first element", "ply\nformat ascii 1.0\nproperty float x\nend_header\n",
-        "before the first element")
+    ply("a property precedes the first element", "ply\nformat ascii 1.0\nproperty float x\nend_header\n",
+        "precedes the first element")
     ply("the vertices twice", replaced("element face 1", "element vertex 1"), "twice")
     ply("an element of a name that is no text",
         replaced("element face 1", "element \0\x1b[2J 9\nproperty float q\nelement face 1"), "a.ply")

@@ -90,7 +90,7 @@ def model_cases(case):
         "100,000 meshes of points",
         {**document, "meshes": [{"primitives": [{**plain, "mode": 0}]}] * 100000},
         3,
-        "nothing to see",
+        "nothing is visible",
     )
     model(
         "5,000 metals that differ in roughness",

@@ -321,10 +321,10 @@ class Verify(CliTest):
     def test_without_a_page_its_command_is_said_and_the_answer_is_the_same(self):
         for python, why in (("/nowhere/python", "cannot start '/nowhere/python': No such file or directory"),
                             ("false", "'false' ended with code 1"),
-                            ("", "as CRT_PYTHON asks")):
+                            ("", "because CRT_PYTHON is empty")):
             run = self.crt("verify", "-b", "example", "--case", "furnace", "-o", "out", CRT_PYTHON=python)
-            self.assertRegex(run.stdout, f"there is no page[,:] {why}; this makes it: ")
-            self.assertRegex(run.stdout, "this makes it: .*share/crt/report out\n")
+            self.assertRegex(run.stdout, f"no page was made[,:] {why}; this command makes it: ")
+            self.assertRegex(run.stdout, "this command makes it: .*share/crt/report out\n")
 
     def test_right_physics_passes(self):
         run = self.crt("verify", "-b", "example", "--case", "furnace,square-light")

@@ -284,7 +284,7 @@ class Include(CliTest):
             ("folder.yaml", "is a directory"),
             ("/dev/zero", "'/dev/zero' "),
             ("picture.yaml", "is not text"),
-            ("s.yaml", "is included by itself"),
+            ("s.yaml", "includes itself"),
             ("none/room.yaml", "cannot find 'none/room.yaml'"),
         ):
             self.write("s.yaml", f"crt: 1\ninclude: {name}\n")
@@ -370,7 +370,8 @@ class StandardStreams(CliTest):
     def test_what_cannot_go_there(self):
         fake = ("scene.yaml", "--backend", "fake")
         self.assert_one_error(self.crt(*fake, "-o", "-", "-o", "-.pfm", expect=2), "standard output")
-        self.assert_one_error(self.crt(*fake, "-o", "-.crtfilm", expect=2), "films are written to files")
+        self.assert_one_error(self.crt(*fake, "-o", "-.crtfilm", expect=2), "a film must be written to a "
+                                                                            "file")
         self.write("a.pfm", "")
         self.assert_one_error(
             self.crt("compare", "a.pfm", "a.pfm", "--diff", "-.pfm", expect=2), "standard output"

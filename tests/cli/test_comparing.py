@@ -96,7 +96,7 @@ class Comparing(CliTest):
         # PFM says nothing of all that: what is supposed is said.
         self.crt("scene.yaml", "-b", "fake", "--set", "film.color_space=acescg", "-o", "b.pfm")
         self.assertIn(
-            "A does not say its colour space; it is taken as that of B: ACEScg",
+            "A does not state its colour space; crt assumes that of B: ACEScg",
             self.crt("compare", "b.pfm", "b.exr").stdout,
         )
 
@@ -160,7 +160,7 @@ class Comparing(CliTest):
             "compare", "--backends", "fake,fake", "scene.yaml", "--spp", "64", expect=7, CRT_FAKE_FAULT="nan"
         ).stdout
         self.assertIn("INCONCLUSIVE", text)
-        self.assertIn("samples were no numbers", text)
+        self.assertIn("samples were NaN or infinite", text)
 
     def test_backends_asked_for_wrongly(self):
         self.assert_one_error(self.crt("compare", "--backends", "fake", "scene.yaml", expect=2), "two names")

@@ -64,7 +64,7 @@ class Converging(LightTest):
         self.assertTrue([text for text in told if "nosuch was left out" in text], told)
         # Without a page its command is said.
         self.assertFalse(os.path.exists(self.path(f"{folder}/report.html")))
-        self.assertRegex(run.stderr, f"warning: there is no page.*share/crt/report {folder}\n")
+        self.assertRegex(run.stderr, f"warning: no page was made.*share/crt/report {folder}\n")
         with open(self.path(f"{folder}/manifest.json"), encoding="utf-8") as file:
             listed = [entry["name"] for entry in json.load(file)["files"]]
         maps = [picture["file"] for of in summary["scenes"][0]["maps"]["configurations"]
@@ -103,11 +103,11 @@ class Converging(LightTest):
             ("the colour", [*SMALL, "--set", "film.color_space=acescg"]),
             ("the camera", [*SMALL, "--set", "camera.fov=20"]),
             (
-                "the geometry of scene, %s was another (4 triangles in 2 objects in both)" % self.backend,
+                "the geometry of scene, %s differs (4 triangles in 2 objects in both)" % self.backend,
                 [*SMALL, "--set", "objects.0.mesh.positions.0.0=-1"],
             ),
             (
-                "the materials of scene, %s was another" % self.backend,
+                "the materials of scene, %s differs" % self.backend,
                 [*SMALL, "--set", "materials.floor.reflectance=0.2"],
             ),
             ("the reference", [*SMALL, "--reference", "0.5"]),
@@ -118,7 +118,7 @@ class Converging(LightTest):
         for what, changed in cases:
             with self.subTest(what=what, changed=changed):
                 run = self.converge("scene.yaml", *changed, "--resume", expect=2)
-                self.assert_one_error(run, "another experiment", what)
+                self.assert_one_error(run, "a different experiment", what)
         self.assertEqual(self.rows("out"), before)
         # What is measured is scene radiance, whatever a screen is shown.
         self.converge(
@@ -196,7 +196,7 @@ class Converging(LightTest):
                     folder="o" + changed[5:8],
                     expect=2,
                 )
-                self.assert_one_error(run, "a reference in other colours")
+                self.assert_one_error(run, "a reference with other colour settings")
         self.converge(
             "scene.yaml", "--reference", "ref.exr", "--set", "film.exposure_ev=1", *SMALL, folder="same"
         )
@@ -213,7 +213,7 @@ class Converging(LightTest):
                 run = self.converge(
                     "scene.yaml", "--reference", "ref.exr", *SMALL, "--set", change, folder="o", expect=2
                 )
-                self.assert_one_error(run, "a reference of another scene", words)
+                self.assert_one_error(run, "a reference for another scene", words)
                 self.assertNotIn("the seed", run.stderr)
 
     def test_a_variant_that_shows_another_image_is_not_held_against_the_reference(self):
@@ -234,8 +234,8 @@ class Converging(LightTest):
         self.assertEqual(reference["kind"], "independent")
         self.assertTrue(os.path.exists(self.path("out/reference-scene.exr")))
         self.assertEqual(summary["fits"][0]["error_source"], "reference")
-        self.assertTrue(any("of the 4.0 s of --time went into "
-        "one" in note for note in summary["notes"]), summary["notes"])
+        self.assertTrue(any("of the 4.0 s of --time on "
+                            "one" in note for note in summary["notes"]), summary["notes"])
 
     def test_void_rows_fail_in_text_and_exit_code(self):
         run = self.crt(

@@ -185,7 +185,7 @@ class SmallDisk(CliTest):
         os.remove(self.path("disk/ballast"))
         _, messages = process.communicate(timeout=harness.PATIENCE_SECONDS)
         self.assertEqual(process.returncode, 0, messages)
-        self.assertIn("rendering goes on, and so do the attempts", messages)
+        self.assertIn("rendering continues, and crt tries again at the next checkpoint", messages)
         self.assertEqual(self.report("a.report.json")["samples"]["per_pixel"], 40)
 
     def test_a_read_only_disk_is_found_before_rendering(self):
@@ -244,7 +244,7 @@ class UnsoundBackends(CliTest):
     def test_a_film_that_is_no_film_is_refused_and_the_saved_one_kept(self):
         self.crt("scene.yaml", "-b", "fake", "-o", "whole.pfm", "--spp", "16")
         self.save_samples(8, "c.crtfilm")
-        for fault, words in (("nan_film", "is not a number"), ("count_film", "were asked for")):
+        for fault, words in (("nan_film", "is not a number"), ("count_film", "instead of")):
             with self.subTest(fault=fault):
                 run = self.crt(
                     "scene.yaml", "-b", "fake", "-o", "a.pfm", "--spp", "16", "--resume", "c.crtfilm",

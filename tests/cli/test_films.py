@@ -107,7 +107,7 @@ class StoppingAndGoingOn(CliTest):
 
     def test_after_its_time_a_path_without_end_is_given_up(self):
         run = self.crt(*self.endless("--time", "1s"), fault="endless")
-        self.assertIn("the samples that were being taken are left out", run.stderr)
+        self.assertIn("the samples in progress are left out", run.stderr)
         self.assert_samples_before_are_kept("time")
 
     def test_after_ctrl_c_a_path_without_end_is_given_up(self):
@@ -392,7 +392,7 @@ class Developing(CliTest):
         ):
             with self.subTest(key=key):
                 run = self.crt("develop", "a.crtfilm", "-o", "d.pfm", "--set", key, expect=2)
-                self.assert_one_error(run, "needs a render", key.split("=")[0])
+                self.assert_one_error(run, "needs a new render", key.split("=")[0])
         for key, hint in (
             ("film.exposure_eb=1", "film.exposure_ev"),
             ("exposure_ev=1", "film.exposure_ev"),

@@ -92,7 +92,7 @@ class LostGpu(FakeGpuTest):
                 "a.pfm", "--device", "all", "--chunk", "4", spp=40, CRT_FAKE_CUDA_DEVICES="2",
                 CRT_FAKE_CUDA_LOST=f"{lost}:7",
             )
-            self.assertIn(f"device {lost} 'Fake GPU' is dropped, the others go on", run.stderr)
+            self.assertIn(f"device {lost} 'Fake GPU' is dropped; the other devices continue", run.stderr)
             self.assertIn("CUDA_ERROR_LAUNCH_FAILED", run.stderr)
             self.assert_same("a.pfm", "whole.pfm")
             devices = {d["device"]: d for d in self.report("a.report.json")["devices"]}
@@ -155,7 +155,7 @@ class Waves(FakeGpuTest):
         full = self.memory("whole.pfm")["device_peak_bytes"]
         run = self.render("a.pfm", "--kernel", "lean-only", spp=1, CRT_FAKE_CUDA_MEMORY=str(full + 4096))
         self.assertIn("the paths of a wave needs", run.stderr)
-        self.assertIn("going on with the precompiled kernel", run.stderr)
+        self.assertIn("continuing with the precompiled kernel", run.stderr)
         self.assertEqual(self.memory("a.pfm")["film_bands"], 1)
         self.assert_same("a.pfm", "whole.pfm")
 
@@ -165,14 +165,14 @@ class Waves(FakeGpuTest):
             "a.pfm", "--device", "all", "--chunk", "4", "--kernel", "lean-only", spp=40,
             CRT_FAKE_CUDA_DEVICES="2", CRT_FAKE_CUDA_LOST="1:50",
         )
-        self.assertIn("device 1 'Fake GPU' is dropped, the others go on", run.stderr)
+        self.assertIn("device 1 'Fake GPU' is dropped; the other devices continue", run.stderr)
         self.assert_same("a.pfm", "whole.pfm")
 
     def test_a_compiler_that_fails(self):
         self.render("whole.pfm", "--kernel", "full")
         for failure in ("fail", "crash"):
             run = self.render("a.pfm", "--kernel", "lean-only", CRT_FAKE_NVRTC_SECONDS=failure)
-            self.assertIn("using the precompiled kernel with everything in", run.stderr)
+            self.assertIn("using the precompiled kernel with all features", run.stderr)
             self.assert_same("a.pfm", "whole.pfm")
 
 
@@ -272,7 +272,7 @@ class LittleGpuMemory(FakeGpuTest):
         run = self.render(
             "a.pfm", "-v", spp=64, CRT_FAKE_CUDA="overtaken", CRT_FAKE_CUDA_MEMORY="100000",
         )
-        self.assertIn("going on without slices", run.stderr)
+        self.assertIn("continuing without slices", run.stderr)
         self.assertEqual(self.memory("a.pfm")["film_bands"], 1)
         self.assert_same("a.pfm", "whole.pfm")
 
@@ -371,7 +371,7 @@ class KernelCaches(FakeGpuTest):
         self.assert_rendered("a cached kernel is refused", "belongs to another user")
         self.assert_rendered(from_cache=True)
         os.chown(self.path("cache"), 65534, 65534)
-        self.assert_rendered("no kernel cache, so kernels are compiled anew")
+        self.assert_rendered("no kernel cache, so every process compiles its kernels")
 
     def test_what_others_may_write_to_is_not_run(self):
         (kernel,) = self.kernels()
@@ -379,7 +379,7 @@ class KernelCaches(FakeGpuTest):
         self.assert_rendered("a cached kernel is refused")
         self.assert_rendered(from_cache=True)
         os.chmod(self.path("cache"), 0o777)
-        self.assert_rendered("no kernel cache, so kernels are compiled anew")
+        self.assert_rendered("no kernel cache, so every process compiles its kernels")
 
     def test_no_folder_can_be_made(self):
         self.write("file", "")

@@ -167,7 +167,7 @@ def scene_cases():
         words="is not text",
     )
     scene("an escape sequence for terminals", "crt: 1\ntitle: \x1b[2J\n", words="byte 0x1b")
-    scene("a tab as indentation", "crt: 1\nfilm:\n\tresolution: [8, 8]\n", words="indent with blanks")
+    scene("a tab as indentation", "crt: 1\nfilm:\n\tresolution: [8, 8]\n", words="indent with spaces")
     scene("an open bracket", HEAD + "outputs: [", words="not valid YAML")
     scene("an open quote", HEAD + 'title: "no end', words="not valid YAML")
     scene("a key twice", HEAD + "film: {resolution: [4, 4]}\n", words="duplicate key 'film'")
@@ -195,7 +195,7 @@ def scene_cases():
     scene("the version not first", "title: x\ncrt: 1\n", words="must be the first key")
     key("a number that is none", "camera: {fov: nan}", "NaN")
     key("an infinite number", "camera: {fov: .inf}", "infinity")
-    key("a number beyond a double", "camera: {position: [1e999, 0, 0]}", "outside the range")
+    key("a number too large for a double", "camera: {position: [1e999, 0, 0]}", "outside the range")
     key("a number in octal", "integrator: {max_depth: 012}", "octal")
     key("a hexadecimal number", "integrator: {max_depth: 0x10}", "decimal")
     key("yes for true", "integrator: {nee: yes}", "write true")
@@ -296,7 +296,8 @@ def scene_cases():
         scene(f"a crop of {crop}", f"crt: 1\nfilm: {{resolution: [8, 8], crop: {crop}}}\n", words="window")
     for fov in (0, 180, -10, "wide"):
         key(f"a field of view of {fov}", f"camera: {{fov: {fov}}}", "fov")
-    key("a camera that looks at itself", "camera: {position: [1, 1, 1], target: [1, 1, 1]}", "looks nowhere")
+    key("a camera that looks at itself", "camera: {position: [1, 1, 1], target: [1, 1, 1]}", "has no "
+                                                                                             "direction")
     key("up along the view", "camera: {position: [0, 0, 0], target: [0, 1, 0]}", "parallel")
     key("up of no length", "camera: {up: [0, 0, 0]}", "length 0")
     key("a camera at 1e300", "camera: {position: [1e300, 0, 0]}", codes=(0, 3))
@@ -313,7 +314,7 @@ def scene_cases():
         scene(
             f"sampler.{name}: {value}",
             f"crt: 1\nsampler: {{{name}: {value}}}\n",
-            words={"must be", "cannot be had", "whole number", "expected"},
+            words={"must be", "are not available", "whole number", "expected"},
         )
     for value in (-1, "1e10", 1.5):
         key(f"integrator.max_depth: {value}", f"integrator: {{max_depth: {value}}}", "max_depth")
@@ -360,7 +361,7 @@ def scene_cases():
     shape(
         "transforms to infinity",
         "{positions: [[0,0,0],[1,0,0],[0,1,0]], faces: [[0,1,2]]}",
-        "beyond a double",
+        "too large for a double",
         extra=", transform: [{scale: 1e200}, {scale: 1e200}]",
     )
     shape(
@@ -411,7 +412,7 @@ def scene_cases():
     scene(
         "no light but one of radiance 1e-50",
         HEAD + "environment: {radiance: 1e-50}\n",
-        words="single precision carries light from 1e-25",
+        words="the smallest value in single precision is 1e-25",
     )
     for text, words in (
         ("spectral: 7", "expected a map"),
@@ -438,7 +439,7 @@ def scene_cases():
         ("[{type: point, position: [0, 0, 1]}]", "needs radiant_intensity or"),
         ("[{type: point, position: [0, 0, nan], power_w: 1}]", "NaN"),
         ("[{type: point, position: [0, 0, 1], power_w: -1}]", "must be 0 or more"),
-        ("[{type: point, position: [0, 0, 1], power_w: 1e300}]", "single precision carries light up to"),
+        ("[{type: point, position: [0, 0, 1], power_w: 1e300}]", "the largest value in single precision is"),
         ("[{type: point, position: [0, 0, 1], power_w: 1, spectrum: 0}]", "no light that 'power_w'"),
         ("[{type: spot, position: [0, 0, 1], power_w: 1}]", "needs direction or target"),
         ("[{type: spot, position: [0, 0, 1], power_w: 1, target: [0, 0, 1]}]", "where the light is"),
@@ -449,8 +450,8 @@ def scene_cases():
         scene(f"lights: {text}".replace("\n", ", "), GOOD + f"lights: {text}\n", words=words)
     ies = "IESNA91\nTILT=NONE\n1 1 1 2 1 1 1 0 0 0\n1 1 1\n0 90\n0\n2 1\n"
     for asked, data, words in (
-        ("an empty IES file", "", "no line 'TILT='"),
-        ("an IES file that is a picture", "\x89PNG" * 99, "no line 'TILT='"),
+        ("an empty IES file", "", "the line 'TILT=' is missing"),
+        ("an IES file that is a picture", "\x89PNG" * 99, "the line 'TILT=' is missing"),
         ("an IES file cut short", ies[:-4], ("lamp.ies:6", "the file ends where")),
         ("an IES file of a thousand million values", ies.replace("2 1 1 1", "9999 9999 1 1"), "too short"),
         ("an IES file with a negative count", ies.replace("2 1 1 1", "-2 1 1 1"), "whole number"),
@@ -588,7 +589,8 @@ def scene_cases():
     )
     for count in (65, 20000):
         chain = "".join(f"  s{i}: s{i - 1}\n" for i in range(1, count))
-        for first, words in (("0.5", "in a chain of spectra"), (f"s{count - 1}", ("spectr",))):
+        for first, words in (("0.5", "in a chain of references to other "
+                                     "spectra"), (f"s{count - 1}", ("spectr",))):
             scene(
                 f"a chain of {count} spectra that begins with {first}",
                 HEAD + f"spectra:\n  s0: {first}\n{chain}"
@@ -609,7 +611,7 @@ def scene_cases():
         "depths beyond single precision",
         GOOD.replace("[1,0,0],[0,1,0]", "[1e39,0,0],[0,1e39,0]")
         + "camera: {position: [0, 0, 4e39]}\noutputs: [{file: a.exr, aovs: [depth]}]\n",
-        words="too large for its distances",
+        words="too large for single precision",
         arguments=("scene.yaml", "-b", "fake"),
     )
     scene("a path of 50,000 parts", GOOD, words="64 parts",
@@ -633,7 +635,7 @@ def scene_cases():
     ):
         words = {
             "folder": "this is a directory",
-            "pipe": "for standard input write '-'",
+            "pipe": "write '-' for standard input",
             "sparse": "the most for a file of this kind",
         }.get(name, ())
         case("scene", f"{asked} in place of the scene", ["info", name], 3, words, endless_files)
@@ -772,7 +774,7 @@ def mesh_cases():
         "an MTL whose light is 1e30",
         "newmtl a\nKe 1e30 1e30 1e30\n",
         3,
-        "single precision carries light up to 1e+25",
+        "the largest value in single precision is 1e+25",
     )
     mtl("an MTL of noise", bytes(range(256)) * 256)
     mtl("a newmtl without a name", "newmtl\nKd 1 1 1\n")
@@ -869,10 +871,10 @@ def texture_cases(samples):
     texture("a good JPEG", "a.jpg", jpeg, codes=0)
     texture("an EXR", "a.exr", samples["exr"], codes=0)
     texture("no file", "a.png", None, ("scene.yaml:4:", "cannot find 'a.png'"))
-    texture("an empty file", "a.png", b"", "it is no PNG, JPEG")
-    texture("text", "a.png", "not an image\n" * 100, "it is no PNG, JPEG")
+    texture("an empty file", "a.png", b"", "it is not a PNG, JPEG")
+    texture("text", "a.png", "not an image\n" * 100, "it is not a PNG, JPEG")
     texture("noise", "a.jpg", b"\xff\xd8\xff" + bytes(range(256)) * 10, "a.jpg")
-    texture("a TIFF", "a.tif", b"II*\0" + b"\0" * 100, "it is no PNG, JPEG")
+    texture("a TIFF", "a.tif", b"II*\0" + b"\0" * 100, "it is not a PNG, JPEG")
     texture("a mesh without texture coordinates", "a.png", png(8, 8), "no texture coordinates", mesh="")
     texture("an unknown wrap", "a.png", png(8, 8), "did you mean 'repeat'", more=", wrap: repaet")
     texture("a scale beyond all digits", "a.png", png(8, 8), "1000000", more=", scale: 1e300")
@@ -1288,7 +1290,7 @@ def environment_cases():
     with_variable(
         "a cache folder that everyone can write to",
         0,
-        "no kernel cache, so kernels are compiled anew: everyone can write",
+        "no kernel cache, so every process compiles its kernels: everyone can write",
         shared_cache,
         CRT_CACHE_DIR="cache",
     )
@@ -1651,7 +1653,7 @@ def fault_cases(samples):
             ["scene.yaml", "-b", "fake", *([] if option == "-o" else ["-o", "a.pfm"]), option, name],
             2,
             (
-                "which is read"
+                "would replace the input"
                 if name not in ("scene.yaml", "own.mtl", "s.spd", "mesh.obj")
                 else "would replace"
             ),
@@ -1693,7 +1695,7 @@ def fault_cases(samples):
         "develop to two names of one file",
         ["develop", "a.crtfilm", "-o", "d.png", "-o", "here/d.png"],
         2,
-        "are one file",
+        "are the same file",
         film_by_other_names,
     )
     case(

@@ -69,7 +69,8 @@ class Imports(CliTest):
         done = self.crt("import", "a.glb")
         self.assertIn("# Chosen: the file has no camera.", done.stdout)
         self.assertIn(
-            "a.glb: not in the file, and chosen: a camera that sees all of it; a grey sky and a lamp",
+            "a.glb: not in the file, so crt chose: a camera that sees the whole model; a grey sky and a "
+            "lamp",
             done.stderr,
         )
 
@@ -113,7 +114,7 @@ class Imports(CliTest):
                    "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
                    "0 0 0 255 0 0\n1 0 0 0 255 0\n1 1 0 0 0 255\n0 1 0 255 255 255\n4 0 1 2 3\n")
         done = self.crt("import", "a.ply", "-o", "a.yaml")
-        self.assertIn("a matt material of the colours of its vertices", done.stderr)
+        self.assertIn("a matt material with the colours of its vertices", done.stderr)
         with open(self.path("a.yaml")) as file:
             self.assertIn("reflectance: {attribute: colors}", file.read())
         small = ("--spp", "4", "--set", "film.resolution=[48,32]", "-b", BACKEND)
@@ -150,9 +151,8 @@ class Meshes(CliTest):
     def test_a_mesh_without_materials_is_refused_with_the_line_to_add(self):
         said = self.render("mtllib lost.mtl\n" + SQUARE + "usemtl red\nf 1 2 3 4\n", keys="", expect=3)
         self.assertIn(
-            "mesh.yaml:5:17: error: 2 of 2 triangles of object 0 have no material (the OBJ names "
-            "'lost.mtl', "
-            "which is not there); "
+            "mesh.yaml:5:17: error: 2 of 2 triangles of object 0 have no material (the OBJ refers to "
+            "'lost.mtl', which does not exist); "
             "give them one with 'material: NAME'",
             said,
         )
@@ -162,8 +162,9 @@ class Meshes(CliTest):
     def test_the_same_mesh_renders_with_one(self):
         said = self.render("mtllib lost.mtl\n" + SQUARE + "usemtl red\nf 1 2 3 4\n")
         self.assertIn(
-            "warning: mesh.obj: material 'red' is not defined, and no file 'lost.mtl' is there: 2 of 2 "
-            "triangles have none of their own",
+            "warning: mesh.obj: material 'red' is not defined, and the file 'lost.mtl' does not exist: 2 of "
+            "2 "
+            "triangles have no material",
             said,
         )
 
@@ -180,13 +181,13 @@ class Meshes(CliTest):
 
     def test_another_format_is_named(self):
         self.assertIn(
-            "mesh.obj: this is a PLY file; name it by 'ply:' in place of 'obj:'",
+            "mesh.obj: this is a PLY file; use 'ply:' instead of 'obj:'",
             self.render("ply\nformat ascii 1.0\n", expect=3),
         )
 
     def test_an_index_that_leads_nowhere_is_refused_with_its_line(self):
         self.assertIn(
-            "mesh.obj:6: a face names vertex 7, but the file has 4",
+            "mesh.obj:6: a face uses vertex 7, but the file has 4",
             self.render(SQUARE + "f 1 2 3\nf 1 2 7\n", expect=3),
         )
 

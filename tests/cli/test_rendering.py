@@ -394,7 +394,7 @@ class SeveralDevices(CliTest):
             "scene.yaml", "-b", "fake", "-o", "a.pfm", "--spp", "40", "--device", "all",
             fault="device", CRT_FAKE_FAULT_DEVICE="1",
         )
-        self.assertIn("device 1 'second pattern' is dropped, the others go on", run.stderr)
+        self.assertIn("device 1 'second pattern' is dropped; the other devices continue", run.stderr)
         self.assertIn("fell off the bus", run.stderr)
         self.assertEqual(read_bytes(self.path("a.pfm")), read_bytes(self.path("whole.pfm")))
         first, second = self.report("a.report.json")["devices"]
@@ -432,7 +432,7 @@ class Light(LightTest):
     def test_a_black_image_says_what_to_look_at(self):
         run = self.crt("scene.yaml", "-b", self.backend, "-o", "a.pfm", "-o", "a.crtfilm")
         self.assertNotIn("black", run.stderr)
-        self.assertNotIn("lights nothing", run.stderr)
+        self.assertNotIn("illuminates nothing", run.stderr)
         # Turned round, and with the camera below.
         self.write(
             "away.yaml",
@@ -442,7 +442,7 @@ class Light(LightTest):
             ),
         )
         run = self.crt("away.yaml", "-b", self.backend, "-o", "a.pfm", "-o", "a.crtfilm")
-        self.assertIn("warning: 'lamp' lights nothing", run.stderr)
+        self.assertIn("warning: 'lamp' illuminates nothing", run.stderr)
         self.assertRegex(
             run.stderr, r"warning: the image is black: no path met a light; 'lamp' may face away"
         )

@@ -393,7 +393,7 @@ class Tev(CliTest):
             nobody.bind(("127.0.0.1", 0))
             view = View(self, "-b", "fake", "--tev", f"127.0.0.1:{nobody.getsockname()[1]}")
             status, _ = view.wait(lambda s: s["tev"])
-        self.assertIn("is not reached", status["tev"])
+        self.assertIn("cannot be reached", status["tev"])
 
 
 def is_open(connection):

@@ -218,7 +218,7 @@ class Waiting(CliTest):
         report = self.report()
         self.assertEqual(report["scene"]["nodes"], 0)
         self.assertIn(
-            {"what": "BVH", "why": "the backend builds an acceleration structure of its own"},
+            {"what": "BVH", "why": "the backend builds its own acceleration structure"},
             report["features"]["left_out"],
         )
         # Nor from far away, where boxes have to allow for more rounding (docs/decisions/0045).

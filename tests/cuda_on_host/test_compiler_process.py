@@ -128,14 +128,14 @@ class CompilerProcess(unittest.TestCase):
         run, backend = self.render("fail", "--time", "3", "--spp", "1000000")
         self.assertEqual(backend["kernel"], "precompiled")
         self.assertIn(
-            "going on with the precompiled kernel: NVRTC 13.0 cannot compile the kernel", run.stderr
+            "continuing with the precompiled kernel: NVRTC 13.0 cannot compile the kernel", run.stderr
         )
         self.assertIn("told by the fake compiler", run.stderr)
 
     def test_a_compiler_that_crashes_costs_nothing(self):
         run, backend = self.render("crash", "--time", "3", "--spp", "1000000")
         self.assertEqual(backend["kernel"], "precompiled")
-        self.assertIn("the compiler's process was ended by signal 6", run.stderr)
+        self.assertIn("the compiler process was ended by signal 6", run.stderr)
 
 
 if __name__ == "__main__":

@@ -25,7 +25,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         const std::size_t pixels = std::size_t{image.width} * image.height;
         if (image.pixels.size() != pixels * image.channels.size() ||
             image.integers.size() != pixels * image.integer_channels.size())
-            fuzz::finding("image", "does not have the pixels that its size and channels say");
+            fuzz::finding("image", "has a number of values that contradicts its size and channels");
         (void)metadataValue(image, "crt/sceneHash");
     });
     return 0;

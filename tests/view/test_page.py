@@ -226,7 +226,7 @@ class Trouble(PageTest):
         self.view.process.wait()
         self.wait(page, "!view.connected")
         self.assertEqual(page.locator("#live").text_content(), "connection lost")
-        self.assertIn("does not answer", page.locator("#notes").inner_text())
+        self.assertIn("does not respond", page.locator("#notes").inner_text())
         self.assertEqual(self.pixels(page), before)
         self.write("scene.yaml", LIT.replace("reflectance: 0.7", "reflectance: 0.2"))
         View(self, "-b", self.backend, port=self.view.port)

@@ -1,5 +1,5 @@
-/// How a GPU should schedule the vertices of paths, from what the scene needs. Header-only and free of the
-/// core. Never changes the image.
+/// Chooses how a GPU schedules the vertices of paths, from the features of the scene. Header-only and free
+/// of the core. Never changes the image.
 #pragma once
 
 #include "kernel/dialect/features.h"
@@ -9,8 +9,8 @@
 
 namespace crt {
 
-/// Whether paths of so many scattering events may take longer than one launch should, as between mirrors
-/// without roulette. Nothing can interrupt a launch: only between launches can a render stop.
+/// True if paths of this number of scattering events may take longer than one launch should, as between
+/// mirrors without roulette. Nothing can interrupt a launch: only between launches can a render stop.
 inline bool mayOutlastLaunch(std::uint32_t max_depth) { return max_depth > 1u << 16; }
 
 /// Whether tracing and shading should be kernels of their own, paths sorted by the kind of material that

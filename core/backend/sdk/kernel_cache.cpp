@@ -137,7 +137,7 @@ std::string KernelCache::path(const Key& key) const {
 std::optional<std::vector<unsigned char>> KernelCache::load(const Key& key, std::string* refused) const {
     if (directory_.empty()) return std::nullopt;
     const std::string name = path(key);
-    // Not blocking: whoever may write to the directory could have put a pipe there.
+    // Not blocking: a user with write access to the directory could have put a pipe there.
     const File file(::open(name.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOFOLLOW));
     struct stat status;
     if (!file.isOpen() || ::fstat(file.get(), &status) != 0) return std::nullopt;

@@ -37,15 +37,15 @@ public:
     /// compiler, driver.
     static Key makeKey(const std::vector<std::string_view>& parts);
 
-    /// The binary stored under `key`, and marks it as used now. What it holds will be run: an entry that
-    /// another user could have written is not loaded, and `refused`, where given, says why. [any thread]
+    /// The binary stored under `key`, and marks it as used now. Entries are executed: an entry that another
+    /// user could have written is not loaded, and `refused`, where given, says why. [any thread]
     std::optional<std::vector<unsigned char>> load(const Key& key, std::string* refused = nullptr) const;
 
     /// Stores a binary, then removes what was used longest ago until all entries fit into max_bytes. Returns
     /// whether it is stored. [any thread]
     bool store(const Key& key, const void* data, std::size_t size) const;
 
-    /// Where an entry lies. Empty when the cache is off.
+    /// Path of an entry. Empty when the cache is off.
     std::string path(const Key& key) const;
 
 private:

@@ -18,12 +18,12 @@
 ///
 ///         static constexpr double kAcceleratorReach = 4;
 ///
-/// Any of these may throw: PluginError for a failure with a status and a sentence of its own,
-/// std::bad_alloc, or anything. The table made here turns every exception into a status and a message, so
-/// that none crosses the border. It also looks after struct_size in both directions: the class always sees
-/// whole structs of the headers it was compiled with, and the host's are never overrun. And the class only
-/// sees calls that make sense: setScene with a blob that begins with a scene, render of a rectangle within
-/// that scene's film, readFilm into a view of its size.
+/// Any of these may throw: PluginError for a failure with its own status and sentence, std::bad_alloc, or
+/// anything. The table made here turns every exception into a status and a message, so that none crosses the
+/// border. It also looks after struct_size in both directions: the class always sees whole structs of the
+/// headers it was compiled with, and the host's are never overrun. And the class only sees calls that make
+/// sense: setScene with a blob that begins with a scene, render of a rectangle within that scene's film,
+/// readFilm into a view of its size.
 #pragma once
 
 #include "backend/crt_backend.h"
@@ -43,7 +43,7 @@
 #include <utility>
 #include <vector>
 
-/// Whether the writer of the sized struct `*pointer` knew `member`.
+/// True if the writer of the sized struct `*pointer` knew `member`.
 #define CRT_HAS_MEMBER(pointer, member)                                                     \
     ((pointer)->struct_size >=                                                              \
         offsetof(std::remove_cv_t<std::remove_reference_t<decltype(*(pointer))>>, member) + \
@@ -87,7 +87,7 @@ void writeText(char (&buffer)[N], const std::string& text) noexcept {
     writeText(buffer, N, text.c_str());
 }
 
-/// Size of each struct in the first minor revision of this ABI: whoever gives less breaks the contract.
+/// Size of each struct in the first minor revision of this ABI: a smaller one breaks the contract.
 template <class T> constexpr std::size_t kFirstSize = 0;
 template <>
 inline constexpr std::size_t kFirstSize<CrtHost> = offsetof(CrtHost, kernel_source) +
@@ -142,7 +142,7 @@ void writeSized(T* to_host, const T& value) noexcept {
     to_host->struct_size = static_cast<std::uint32_t>(size);
 }
 
-/// What the host offers. Cheap to copy; valid as long as the integrators created with it.
+/// Functions of the host. Cheap to copy; valid as long as the integrators created with it.
 class Host {
 public:
     explicit Host(const CrtHost* table) : table_(table) { requireSized(table, "the host table"); }
@@ -223,8 +223,7 @@ CrtStatus guarded(char* text, std::size_t text_size, Body&& body) noexcept {
     }
 }
 
-/// The verbs of CrtIntegrator for the class `I`. What the host sees as CrtIntegratorState is one object of
-/// this class.
+/// The verbs of CrtIntegrator for the class `I`. The host's CrtIntegratorState is an object of this class.
 template <class I>
 class IntegratorVerbs {
 public:
@@ -302,11 +301,12 @@ private:
                 throw PluginError(CRT_INVALID_ARGUMENT, "read_film was called before set_scene");
             if (view.width != self.film_.width || view.height != self.film_.height ||
                 view.channels != self.film_.channels) {
-                throw PluginError(CRT_INVALID_ARGUMENT, "the film view is not of the scene's size");
+                throw PluginError(CRT_INVALID_ARGUMENT, "the size of the film view differs from the "
+                                                        "scene's");
             }
             if (view.primitives != nullptr && !self.film_.primitives) {
                 throw PluginError(CRT_INVALID_ARGUMENT,
-                                  "the film view wants primitives, for which the scene does not ask");
+                                  "the film view has primitives, but the scene does not request them");
             }
             self.integrator_.readFilm(view);
             return CRT_OK;
@@ -348,7 +348,7 @@ CrtStatus probe(const CrtHost* host, CrtDevice* devices, std::uint32_t capacity,
                 char* reason, std::uint32_t reason_size) noexcept {
     return guarded(reason, reason_size, [&]() -> CrtStatus {
         if (count == nullptr || (devices == nullptr && capacity != 0)) {
-            throw PluginError(CRT_INVALID_ARGUMENT, "probe was called without room for an answer");
+            throw PluginError(CRT_INVALID_ARGUMENT, "probe was called without memory for its result");
         }
         *count = 0;
         const std::vector<CrtDevice> found = List(Host(host));
@@ -394,8 +394,8 @@ constexpr CrtBackend makeBackend(const char* name, const char* version, const ch
     return table;
 }
 
-/// Which device --device means: "" or null the best score, digits an index, else the first (best) whose name
-/// holds the text, in any case. Throws PluginError(CRT_NO_DEVICE) that lists what there is.
+/// The device that --device selects: "" or null the best score, digits an index, else the first (best) whose
+/// name holds the text, in any case. Throws PluginError(CRT_NO_DEVICE) that lists what there is.
 inline const CrtDevice& chooseDevice(const std::vector<CrtDevice>& devices, const char* wanted) {
     const std::string text = wanted != nullptr ? wanted : "";
     const bool is_index = !text.empty() && text.find_first_not_of("0123456789") == std::string::npos;

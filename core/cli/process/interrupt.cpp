@@ -39,9 +39,10 @@ extern "C" void onSignal(int signal) {
     // The time first: a second signal on another thread must never see a signal without its time.
     g_first_at = monotonicNanoseconds();
     g_signal = signal;
-    constexpr std::string_view text = "\ncrt: finishing the running chunk; once more to leave at once\n";
-    // A terminal has just shown ^C on the line of the bar, so a person there gets an answer; a log file is
-    // told by the report.
+    constexpr std::string_view text = "\ncrt: finishing the current chunk; press Ctrl-C again to stop "
+                                      "immediately\n";
+    // A terminal has just shown ^C on the line of the bar, so a person there gets an answer; a log file gets
+    // the report.
     if (signal == SIGINT && isatty(STDERR_FILENO) != 0 &&
         ::write(STDERR_FILENO, text.data(), text.size()) < 0) {
         // Nothing can be done about it here.

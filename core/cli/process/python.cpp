@@ -12,7 +12,7 @@ namespace crt {
 namespace {
 
 /// Ends with code 0 where there is a package crt that imports scenes of others: PyPI has another package of
-/// the name. What lies in the working directory is not run.
+/// the name. Modules in the working directory are not run.
 constexpr const char* kPackageIsThere =
     "import importlib.util, os, sys\n"
     "sys.path[:] = [folder for folder in sys.path if folder]\n"

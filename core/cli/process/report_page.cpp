@@ -40,18 +40,21 @@ std::optional<std::string> makeReportPage(const std::string& folder) {
         program.empty() ? shellLine({"python", "-m", "crt", "report", folder})
                         : shellLine({python.empty() ? "python3" : python, program, folder});
     if (python.empty())
-        return fmt::format("there is no page, as CRT_PYTHON asks; this makes it: {}", command);
+        return fmt::format("no page was made, because CRT_PYTHON is empty; this command makes it: {}",
+                           command);
     if (program.empty())
-        return fmt::format("there is no page: its program is not installed; this makes it: {}", command);
+        return fmt::format("no page was made, because its program is not installed; this command makes it: "
+                           "{}", command);
     const trust::Judged judged = trust::judgeTree(program);
     if (!judged.why.empty())
-        return fmt::format("there is no page: its program is refused: {}; then this makes it: {}",
+        return fmt::format("no page was made, because its program is refused: {}; after that this command "
+                           "makes it: {}",
                            judged.why, command);
     // -B: nothing is written where the program is installed.
     const EndedProgram ended =
         runProgram({python, "-B", judged.path, std::filesystem::absolute(folder).string()});
     if (ended.error == 0 && ended.status == 0) return std::nullopt;
-    return fmt::format("there is no page: {}; this makes it: {}", whyNot(python, ended), command);
+    return fmt::format("no page was made: {}; this command makes it: {}", whyNot(python, ended), command);
 }
 
 }  // namespace crt

@@ -27,7 +27,7 @@ int runMain(const std::function<int()>& body) {
         return code;
     } catch (const Error& error) {
         const std::string text = error.what();
-        // Errors in a scene come with places of their own, which editors find only at the start of a line.
+        // Errors in a scene already contain their places, which editors find only at the start of a line.
         const bool has_places = text.find(": error: ") != std::string::npos;
         logMessage(LogLevel::Error,
                    (has_places ? "the scene cannot be rendered as it is:\n" : "") + text);

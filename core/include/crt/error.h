@@ -18,7 +18,7 @@ enum class ErrorKind : int {
     Output = 6,    ///< A file cannot be written.
 };
 
-/// Where in an input file an error lies. `line` and `column` count from 1; 0 means unknown.
+/// The place of an error in an input file. `line` and `column` count from 1; 0 means unknown.
 struct SourcePlace {
     std::string file;
     int line = 0;

@@ -1,4 +1,4 @@
-/// What libcrt exports, and the namespace that carries the version of its interface.
+/// Marks the exports of libcrt, and defines the namespace that carries the version of its interface.
 #pragma once
 
 #if defined(__GNUC__)

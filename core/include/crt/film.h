@@ -15,8 +15,8 @@
 
 CRT_API_NAMESPACE_BEGIN
 
-/// What a film knows of its own error, relative to the image's mean luminance (docs/error.md): two numbers,
-/// one of all images that differ in their seeds alone, one of this image.
+/// A film's estimate of its error, relative to the image's mean luminance (docs/error.md): two numbers, one
+/// of all images that differ in their seeds alone, one of this image.
 struct ErrorEstimate {
     /// The expected error: root mean square over the pixels and over seeds, and its 95 % interval.
     double relative_rmse = 0;
@@ -27,8 +27,8 @@ struct ErrorEstimate {
 };
 
 struct DevelopOptions {
-    /// Whether the scene's exposure and white balance are applied, as for .png; else values are radiance, as
-    /// in .exr.
+    /// True if the scene's exposure and white balance are applied, as for .png; otherwise values are
+    /// radiance, as in .exr.
     bool for_display = false;
     std::optional<double> exposure_ev{};  ///< Stops, instead of the scene's. Implies for_display.
     std::vector<std::string> aovs{};      ///< More planes, named as in scenes; the film must hold them.

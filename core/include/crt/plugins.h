@@ -21,7 +21,7 @@ struct Plugin {
     std::string path;  ///< Empty: not installed.
     std::string version;
     std::vector<Device> devices;  ///< Best first.
-    std::string reason;           ///< Why it cannot run here; empty when it can.
+    std::string reason;           ///< Reason why it cannot run here; empty if it can.
 };
 
 /// cuda, embree, opencl, and what else lies in the folders of CRT_BACKEND_PATH and in lib/crt beside libcrt.

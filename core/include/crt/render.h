@@ -36,7 +36,7 @@ struct RenderOptions {
     bool estimate_error = true;
 };
 
-/// Why sampling ended.
+/// Reason why sampling ended.
 enum class StopReason : int {
     Samples,  ///< Every sample asked for is in the film.
     Time,     ///< The time is up.
@@ -47,7 +47,7 @@ enum class StopReason : int {
 struct Rendered {
     Film film;
     StopReason stop = StopReason::Samples;
-    /// What the run did and cost, as JSON: the report that crt render writes beside its images.
+    /// Work and cost of the run, as JSON: the report that crt render writes next to its images.
     std::string report_json;
 };
 
@@ -59,7 +59,7 @@ public:
     RenderFailed(const RenderFailed&);
     RenderFailed& operator=(const RenderFailed&);
 
-    /// What was rendered before.
+    /// The samples that were rendered before the failure.
     const Film& film() const { return *film_; }
 
 private:
@@ -84,7 +84,7 @@ public:
     Session(Session&&) noexcept;
     Session& operator=(Session&&) noexcept;
 
-    /// As crt::render. What fails on a device closes it; the next render opens it again.
+    /// As crt::render. A failure of a device closes it; the next render opens it again.
     Rendered render(const RenderOptions& options = {}, Watch* watch = nullptr);
     Rendered render(Film earlier, const RenderOptions& options = {}, Watch* watch = nullptr);
 

@@ -1,4 +1,4 @@
-/// What is to be rendered.
+/// A scene to be rendered.
 #pragma once
 
 #include <crt/export.h>
@@ -29,9 +29,9 @@ public:
     static Scene fromText(const std::string& yaml, const std::vector<SceneOverride>& overrides = {},
                           Watch* watch = nullptr, const std::string& name = "scene",
                           const std::string& directory = ".");
-    /// What fromFile and fromText read, as one text: JSON, which is YAML too, with all that the scene
-    /// includes, with the overrides, and with absolute paths of the files that it names. fromText makes the
-    /// same scene of it.
+    /// The input of fromFile or fromText as one text: JSON, which is also YAML, with all included files,
+    /// with the overrides, and with absolute paths of the files that it names. fromText makes the same scene
+    /// of it.
     static std::string composeFile(const std::string& path, const std::vector<SceneOverride>& overrides = {},
                                    Watch* watch = nullptr);
     static std::string composeText(const std::string& yaml, const std::vector<SceneOverride>& overrides = {},

@@ -1,4 +1,4 @@
-/// What a caller hears of long work, and how it ends it early.
+/// Lets a caller follow long work and end it early.
 #pragma once
 
 #include <crt/export.h>
@@ -9,7 +9,7 @@
 
 CRT_API_NAMESPACE_BEGIN
 
-/// Where a render stands.
+/// Progress of a render.
 struct Progress {
     double samples = 0;                ///< Per pixel, those of an earlier film included.
     std::uint64_t samples_wanted = 0;  ///< Per pixel; 0: as many as the time allows.

@@ -126,7 +126,7 @@ std::string windowConflict(const Image& a, const Image& b) {
         return fmt::format("[{}, {}) × [{}, {}) of {} × {} pixels", i.left, i.left + std::int64_t{i.width},
                            i.top, i.top + std::int64_t{i.height}, i.whole_width, i.whole_height);
     };
-    return fmt::format("A and B are different parts of a picture: {} and {}", window(a), window(b));
+    return fmt::format("A and B are different parts of the image: {} and {}", window(a), window(b));
 }
 
 /// The colour of both images side by side; throws when they do not match.
@@ -187,7 +187,7 @@ CompareResult compareImages(const Image& a, const Image& b, const CompareOptions
     const bool color = hasColor(a) && hasColor(b);
     if ((options.all_channels || !color) && !result.other_channels.empty()) {
         result.mismatch =
-            fmt::format("the images differ in channels: {} only in one of them or of another type",
+            fmt::format("the images differ in channels: {} only in one image or of a different type",
                         fmt::join(result.other_channels, ", "));
         return result;
     }
@@ -290,7 +290,7 @@ void writeDifference(const std::string& path, const Image& a, const Image& b) {
     const std::optional<OutputFormat> format = formatOfFile(path);
     if (!format)
         throw Error(ErrorKind::Usage,
-                    fmt::format("the extension of '{}' is none of .exr, .pfm, .png, .ppm", path), {path});
+                    fmt::format("'{}' does not end in .exr, .pfm, .png or .ppm", path), {path});
     const bool as_values = *format == OutputFormat::Exr || *format == OutputFormat::Pfm;
     writeImage(path, *format, as_values ? differenceImage(a, b) : falseColorDifference(a, b));
 }

@@ -147,7 +147,7 @@ void judge(BackendAgainst& against, const Renders& a, const Renders& b, const st
         0) {  // They were left out of the film, and their values are unknown.
         against.verdict = Verdict::Inconclusive;
         against.other_seeds.reasons.push_back(
-            fmt::format("{} samples were no numbers: nothing can be said", against.invalid_samples));
+            fmt::format("{} samples were NaN or infinite: the comparison is void", against.invalid_samples));
     } else if (against.verdict == Verdict::Inconclusive) {
         against.samples_needed = samplesNeeded(against.other_seeds, gate.delta, samples);
     }
@@ -166,7 +166,7 @@ BackendComparison compareBackends(const Scene& scene, const BackendComparisonOpt
         throw Error(ErrorKind::Usage, "--backends needs two names or more, such as cuda,embree");
     if (options.replicates < 2)
         throw Error(ErrorKind::Usage,
-                    "--replicates needs two or more: one says nothing about its own error");
+                    "--replicates needs two or more: a single one gives no error estimate");
     BackendComparison result;
     const CompiledScene compiled = compileScene(scene, 0);
     result.reference = options.backends.back();
@@ -237,7 +237,7 @@ std::string againstText(const BackendComparison& all, const BackendAgainst& b) {
         line("", b.same_seed.relative_rmse
                      ? fmt::format("error {:.3g} % (RMSE of luminance), at most {} ulp",
                                    100 * *b.same_seed.relative_rmse, b.same_seed.max_ulp)
-                     : "values are not finite: there is no error to measure");
+                     : "values are not finite: the error is undefined");
     }
     line("other seeds",
          fmt::format("{} renders of {} samples per pixel by each", all.replicates, all.samples));

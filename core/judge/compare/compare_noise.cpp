@@ -327,7 +327,7 @@ void testPixels(NoiseComparison& result, const View& view, double alpha) {
     const double fewest = std::min(view.a.dof, view.b.dof);
     if (fewest < kFewestPixelDof) {
         result.pixels_untested =
-            fmt::format("a variance of {:.3g} degrees of freedom says too little of one pixel", fewest);
+            fmt::format("a variance with {:.3g} degrees of freedom is too uncertain for one pixel", fewest);
     } else {
         std::vector<double> p;
         for (std::size_t i = 0; i < view.a.values.size(); ++i) p.push_back(pixelP(view, i));
@@ -347,7 +347,7 @@ NoiseComparison compareNoise(const Image& a, const Image& b) {
         if (statesNoise(*image) && !noisyImage(*image, NoiseOf::Color) &&
             !noisyImage(*image, NoiseOf::Luminance)) {
             result.unknown = fmt::format(
-                "{} does not know the noise of all its pixels (they have too few samples, or lost some)",
+                "{} lacks the noise of some pixels (they have too few samples, or lost some)",
                 name);
             return result;
         }
@@ -412,7 +412,7 @@ void writeZMap(const std::string& path, const NoiseComparison& noise, std::uint3
     const std::optional<OutputFormat> format = formatOfFile(path);
     if (!format)
         throw Error(ErrorKind::Usage,
-                    fmt::format("the extension of '{}' is none of .exr, .pfm, .png, .ppm", path), {path});
+                    fmt::format("'{}' does not end in .exr, .pfm, .png or .ppm", path), {path});
     if (noise.z.empty())
         throw Error(ErrorKind::Usage,
                     fmt::format("there is no z map to write: {}",

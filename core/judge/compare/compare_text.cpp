@@ -99,7 +99,8 @@ void addNoiseLines(Lines& lines, const NoiseComparison& noise, std::uint32_t wid
     lines.heading(noise.stated
                       ? "Noise or bias? By the images' own noise:"
                       : "Noise or bias? Neither image states its noise, so by the signs of the pixels' "
-                        "differences, which are as often up as down where only the seeds differ:");
+                        "differences, which are equally often positive and negative if only the seeds "
+                        "differ:");
     lines.add("noise of A", source(noise.source_a));
     lines.add("noise of B", source(noise.source_b));
     for (const ChannelBias& c : noise.channels) {
@@ -127,8 +128,8 @@ void addNoiseLines(Lines& lines, const NoiseComparison& noise, std::uint32_t wid
                             : "not tested: " + noise.pixels_untested);
     if (noise.stated)
         lines.add("rms z",
-                  fmt::format("{:.3g} (1: all of the difference is noise, and as large as the images "
-                              "say; p {:.2g}): {}",
+                  fmt::format("{:.3g} (1: the difference is only noise, of the size that the images state; "
+                              "p {:.2g}): {}",
                               noise.rms_z, noise.rms_z_p,
                               noise.rmsBeyondNoise() ? "more than noise" : "may be noise"));
 }
@@ -242,13 +243,12 @@ void addReferenceLines(Lines& lines, const ReferenceComparison& r) {
                         percent(*r.reference_rms_error), r.reference_noise_source));
     } else {
         lines.heading(
-            "  R does not say how large its own noise is, so it is in all errors (`crt reference` makes "
-            "references that do).");
+            "  R does not state its own noise, so all errors include it (`crt reference` makes references "
+            "that state it).");
     }
     if (r.errors[0].rmse.spread)
         lines.heading(
-            "  ± is the standard error from the choice of reference: "
-            "eight times an eighth of it was left out.");
+            "  ± is the standard error due to the reference, by a jackknife over its eight parts.");
 }
 
 Json referenceJson(const ReferenceComparison& r) {
@@ -325,7 +325,7 @@ Lines resultLines(const CompareResult& r) {
     if (r.first_difference) lines.add("first difference", differenceText(*r.first_difference));
     if (!r.metrics_valid) {
         lines.add("not finite",
-                  fmt::format("{} values in the first image, {} in the second: no metric means anything",
+                  fmt::format("{} values in the first image, {} in the second: all metrics are meaningless",
                               r.not_finite[0], r.not_finite[1]));
     } else if (r.differing_pixels > 0) {
         addMetricLines(lines, r);

@@ -87,7 +87,7 @@ private:
                 throw Error(
                     ErrorKind::Usage,
                     fmt::format(
-                        "'{}' holds an earlier run: add --resume to go on with it, or choose another folder",
+                        "'{}' holds an earlier run: add --resume to continue it, or choose another folder",
                         request_.output));
             run_.rows = readResults(path("results.jsonl"));
         }
@@ -153,7 +153,7 @@ private:
         if (holds_rows_) sessions_ = readSessions(path("sessions.json"));
         if (holds_rows_ && sessions_.empty())
             run_.notes.push_back(
-                "what was typed in earlier sessions of this run, and how long they took, is not known");
+                "the commands and times of earlier sessions of this run are unknown");
         sessions_.push_back({request_.command, utcNow(), elapsed()});
         keepSession();
     }
@@ -204,24 +204,23 @@ private:
                 throw Error(ErrorKind::Usage, fmt::format("'{}' is missing, against which the rows of this "
                                                           "run were measured: it cannot be resumed",
                                                           request.output));
-            std::string went = "one was rendered when the run began";
+            std::string went = "a reference was rendered when the run began";
             if (!holds_rows_) {
                 const std::optional<MadeReference> made = renderReference(scenes_[s], request, watch_);
                 if (!made) return;
                 logInfo(
-                    "{}: no reference was given; {} of the {} of --time "
-                    "made one: {} samples per pixel on {}{}",
+                    "{}: no reference was given; crt made one in {} of the {} of --time: {} samples per "
+                    "pixel on {}{}",
                     names_[s], durationText(made->seconds), durationText(request_.seconds), made->samples,
                     backend, made->error ? ", its own " + crt::errorText(*made->error) : "");
-                went = fmt::format("{} of the {} of --time went into one", durationText(made->seconds),
+                went = fmt::format("crt spent {} of the {} of --time on one", durationText(made->seconds),
                                    durationText(request_.seconds));
             }
             references_[s] = std::make_unique<Reference>(readReference(request.output, scenes_[s]));
             references_[s]->info.scene = names_[s];
             run_.notes.push_back(fmt::format(
                 "{}: no reference was given, so {}, made with {} and the scene's own light sampling; a "
-                "bias that they share does not show against it ('crt reference' makes one that "
-                "shares less)",
+                "common bias is invisible against it ('crt reference' makes a more independent one)",
                 names_[s], went, backend));
         }
         for (std::size_t s = 0; s < scenes_.size(); ++s) {
@@ -231,7 +230,7 @@ private:
             if (!references_[s])
                 run_.notes.push_back(
                     fmt::format("{}: there is no reference, so errors are the spread between replicates, "
-                                "which no bias shows in",
+                                "which does not contain a bias",
                                 names_[s]));
         }
     }
@@ -266,8 +265,8 @@ private:
         }
         if (!left_cold_)
             run_.notes.push_back(
-                "start-up takes so long that it was not tried beforehand "
-                "everywhere: start-up times cannot be compared");
+                "start-up takes so long that not every configuration was started beforehand: start-up times "
+                "cannot be compared");
         left_cold_ = true;
     }
 
@@ -324,7 +323,7 @@ private:
                     continue;
                 if (!renderOne(*contestant, replicate, share, stop)) {
                     run_.notes.push_back(fmt::format(
-                        "interrupted after {} rounds of replicates; --resume goes on", replicate));
+                        "interrupted after {} rounds of replicates; --resume continues", replicate));
                     return;
                 }
             }
@@ -339,8 +338,8 @@ private:
         const auto every = static_cast<std::uint32_t>(std::clamp(starts, 1.0, 1e6));
         if (every >= request_.replicates && contestant.samplesReached() == 0)
             run_.notes.push_back(fmt::format(
-                "{}: starting {} takes so long that it was timed once only: times that include it "
-                "have no interval",
+                "{}: starting {} takes so long that it was timed once only: times that include it have no "
+                "confidence interval",
                 contestant.key().scene, labelOf(contestant.key())));
         return every;
     }
@@ -462,7 +461,7 @@ private:
             if (info.kind == ReferenceKind::Independent && info.samples < 64 * most)
                 run_.notes.push_back(
                     fmt::format("the reference of {} has {} samples, less than 64 times the {} measured: "
-                                "its variance is subtracted, and widens what is said about bias",
+                                "its variance is subtracted, and widens the bias intervals",
                                 info.scene, info.samples, most));
     }
 

@@ -36,7 +36,8 @@ const char* samplerName(SamplerType type) {
 
 [[noreturn]] void refuse(const std::string& path, const std::string& what) {
     throw Error(ErrorKind::Usage,
-                fmt::format("'{}' holds another experiment: {}; choose another folder, or ask for the same",
+                fmt::format("'{}' holds a different experiment: {}; choose another folder, or the same "
+                            "settings",
                             fs::path(path).parent_path().string(), what));
 }
 
@@ -45,8 +46,7 @@ Experiment readExperiment(const std::string& path) {
     try {
         text = readInput(path, kMostTableBytes);
     } catch (const InputRefused& refused) {
-        throw Error(ErrorKind::Usage, fmt::format("'{}' does not say what experiment it holds (its "
-                                                  "experiment.json {}), so it cannot be resumed",
+        throw Error(ErrorKind::Usage, fmt::format("'{}' cannot be resumed, because its experiment.json {}",
                                                   fs::path(path).parent_path().string(), refused.what()));
     }
     try {
@@ -85,7 +85,7 @@ void requireSame(const std::string& path, const Properties& then, const Properti
                                         [&key = name](const auto& value) { return value.first == key; });
         const std::string was = found == then.values.end() ? "unknown" : found->second;
         if (was != text && withoutDigest(was) == withoutDigest(text))
-            refuse(path, fmt::format("{} of {} was another ({} in both)", name, placeOf(now.key),
+            refuse(path, fmt::format("{} of {} differs ({} in both)", name, placeOf(now.key),
                                      withoutDigest(text)));
         if (was != text)
             refuse(path, fmt::format("{} of {} was {}, and is {} now", name, placeOf(now.key),
@@ -131,7 +131,7 @@ Properties propertiesOf(const Key& key, const Scene& scene, const std::string& c
                 p.values.emplace_back(name, trait.digest.empty() ? trait.text
                                                                  : fmt::format("{}{}{}", trait.text,
                                                                                kDigestMark, trait.digest));
-    p.values.emplace_back("the hash of what is to be seen", content);
+    p.values.emplace_back("the hash of the visible scene", content);
     return p;
 }
 

@@ -64,7 +64,7 @@ std::string order(Fits reached, const std::function<const Target&(const Configur
         quotient(*next.seconds, *first.seconds, pairsOf(reached), fewestReplicates(reached), confidence);
     // Where the fewest samples were enough, only a bound of the time is known.
     if (factor.low > 1 && !next.at_first_point)
-        return text + fmt::format(", {} times sooner than the next, {}", numberText(factor, 2),
+        return text + fmt::format(", {} times sooner than the next one, {}", numberText(factor, 2),
                                   labelOf(reached[1]->key));
     return text + fmt::format("; the next, {}, is not distinguishable from it", labelOf(reached[1]->key));
 }
@@ -92,7 +92,8 @@ std::vector<Finding> commonRace(const Fits& fits, double confidence) {
     if (reached.size() < 2) return {};
     const auto target = [](const ConfigurationFit& fit) -> const Target& { return fit.common; };
     const std::string goal = percentText(reached[0]->common.relative_rmse, 2);
-    return {{Tone::Neutral, fmt::format("Of the errors that all have reached, the least: {}.",
+    return {{Tone::Neutral, fmt::format("This is the smallest error that all configurations have reached: "
+                                        "{}.",
                                         order(reached, target, goal, confidence))}};
 }
 
@@ -154,7 +155,7 @@ std::vector<Finding> bias(const Fits& fits, double margin) {
     if (!pass.empty())
         findings.push_back(
             {Tone::Good,
-             fmt::format("No bias that matters: the image mean of {} lies within ±{} of the reference.",
+             fmt::format("No relevant bias: the image mean of {} lies within ±{} of the reference.",
                          pass.size() == fits.size() ? "every configuration" : configurations(pass.size()),
                          percentText(margin, 1))});
     for (const ConfigurationFit* fit : unclear)
@@ -163,7 +164,7 @@ std::vector<Finding> bias(const Fits& fits, double margin) {
     if (!blind.empty())
         findings.push_back({Tone::Warning,
                             "There is no reference for this scene: errors are the spread between "
-                            "replicates, in which a bias does not show."});
+                            "replicates, which does not contain a bias."});
     const auto noisy = [](const ConfigurationFit* fit) {
         return fit->has_reference && fit->source == ErrorSource::BetweenReplicates;
     };
@@ -208,18 +209,18 @@ Finding trustIn(const ConfigurationFit& fit) {
     const Estimate& ratio = *fit.points.back().calibration;
     const std::string name = labelOf(fit.key), text = numberText(ratio);
     if (!std::isfinite(ratio.high) || !(ratio.low > 0))
-        return {Tone::Warning, fmt::format("Whether the error that {} states of itself is right cannot be "
-                                           "told: predicted over actual is {}.",
+        return {Tone::Warning, fmt::format("It is unknown whether the error that {} states is right: "
+                                           "predicted over actual is {}.",
                                            name, text)};
     const bool holds_one = ratio.low <= 1 && 1 <= ratio.high;
     if (holds_one && ratio.low > 1 / kTenth && ratio.high < kTenth)
         return {
             Tone::Good,
-            fmt::format("The error that {} states of itself can be trusted: predicted over actual is {}.",
+            fmt::format("The error that {} states can be trusted: predicted over actual is {}.",
                         name, text)};
     if (holds_one)
-        return {Tone::Neutral, fmt::format("The error that {} states of itself shows no fault, but is not "
-                                           "known within a tenth: predicted over actual is {}.",
+        return {Tone::Neutral, fmt::format("The error that {} states shows no fault, but is known to no "
+                                           "better than a tenth: predicted over actual is {}.",
                                            name, text)};
     const char* how = ratio.value < 1 ? "understates" : "overstates";
     if (ratio.value > 1 / kTenth && ratio.value < kTenth)

@@ -70,16 +70,15 @@ public:
         constexpr double kFewestValues = 2;  // As an image asks for (film/error_estimate.h).
         if (const double values = error_.valuesOfError(); values < kFewestValues)
             return fmt::format(
-                "the squared errors of its replicates scatter as those of {:.2g} normal values, and "
+                "the squared errors of its replicates scatter like those of only {:.2g} normal values, and "
                 "{} are needed",
                 values, kFewestValues);
         const Estimate power = jackknife(
             error_.counts(), [&](const Resample& r) { return error_.variancePower(r); }, Scale::Linear,
             options_.verdict_confidence);
         if (power.low > -1)
-            return "the variance between its replicates falls more slowly than 1/N, as it does where the "
-                   "rare paths "
-                   "that carry it are met only now";
+            return "the variance between its replicates falls more slowly than 1/N, so rare paths that "
+                   "carry it may only now be sampled";
         return {};
     }
 

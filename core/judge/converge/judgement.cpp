@@ -85,15 +85,15 @@ std::optional<Judgement> faultOf(const ConfigurationFit& fit, const ImageTests& 
     if (tests.heavy_tails)
         return Judgement{
             Verdict::Inconclusive,
-            fmt::format("One value carries {:.2g} % of all squared error, which normal noise does "
-                        "not: too much for the error bar.",
+            fmt::format("One value carries {:.2g} % of the squared error, more than normal noise allows: "
+                        "the error bar is unreliable.",
                         100 * tests.largest_share.value_or(0)),
             {}};
     if (fit.fitted && fit.error.verdict_floor.low > margin * margin) {
         if (fit.error.floor().value < relativeVarianceOf(reference))
             return Judgement{Verdict::Inconclusive,
-                             "The error has a floor, but below the error of the reference itself. A "
-                             "reference with more samples decides.",
+                             "The error has a floor, but it is below the error of the reference. A "
+                             "reference with more samples would decide.",
                              {}};
         return Judgement{Verdict::Fail,
                          fmt::format("The error does not fall below {:.2g} %: pixels are off.",
@@ -109,8 +109,9 @@ std::optional<Judgement> faultOf(const ConfigurationFit& fit, const ImageTests& 
         // No proof: where light is found by rare chance, a pixel's replicates may all have missed it and
         // agree with each other on too little.
         return Judgement{Verdict::Inconclusive,
-                         fmt::format("A pixel differs from the reference (p = {:.1e} after Šidák), or its "
-                                     "replicates are too few to be normal. More samples decide.",
+                         fmt::format("A pixel differs from the reference (p = {:.1e} after Šidák), or "
+                                     "there are too few replicates for a normal distribution. More samples "
+                                     "would decide.",
                                      *tests.smallest_pixel_p),
                          {}};
     return std::nullopt;
@@ -149,7 +150,7 @@ Judgement judge(const ConfigurationFit& fit, const ImageTests& tests, const Rows
     } else if (rows.empty()) {
         judgement = {Verdict::Inconclusive, "Fewer than two replicates were rendered.", {}};
     } else if (!pooled) {
-        judgement = {Verdict::Inconclusive, "There is no reference, so a bias cannot be seen.", {}};
+        judgement = {Verdict::Inconclusive, "There is no reference, so a bias is invisible.", {}};
     } else if (const std::optional<Judgement> fault = faultOf(fit, tests, *pooled, *reference, options)) {
         judgement = *fault;
     } else {
@@ -162,7 +163,7 @@ Judgement judge(const ConfigurationFit& fit, const ImageTests& tests, const Rows
                                        "interval reaches {}.",
                                        margin, confidence, worst)
                          : fmt::format("The {:.3g} % interval of the image mean's bias reaches {}; ±{:.2g} "
-                                       "% is allowed. More samples decide.",
+                                       "% is allowed. More samples would decide.",
                                        confidence, worst, margin),
                      {}};
     }

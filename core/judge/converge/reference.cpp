@@ -161,8 +161,8 @@ int makeReference(const ReferenceRequest& request, Watch& watch) {
     if (made->error) logInfo("its own {}", errorText(*made->error));
     if (made->error && made->error->relative_rmse > 0.02)
         logWarning(
-            "the reference is noisy itself; its variance is subtracted from errors, but more --time, or "
-            "--same-estimator, makes them surer");
+            "the reference is noisy; its variance is subtracted from errors, but more --time, or "
+            "--same-estimator, makes them more reliable");
     return 0;
 }
 
@@ -215,7 +215,7 @@ std::optional<RenderedFolds> renderFolds(const Scene& scene, Session& session,
             throw Error(
                 ErrorKind::Device,
                 fmt::format(
-                    "{} samples of the reference were NaN or infinite: it would have no use as a reference",
+                    "{} samples of the reference were NaN or infinite: it cannot serve as a reference",
                     part.invalidSamples()));
         folds.images.push_back(resolveImage(part, developmentOf(scene).forFloats(), 0));
         folds.film.add(part);
@@ -247,8 +247,8 @@ std::optional<MadeReference> renderReference(Scene scene, const ReferenceRequest
         throw Error(ErrorKind::Usage,
                     "a view has no noise and needs no reference: integrator.type must be path");
     if (std::filesystem::path(request.output).extension() != ".exr")
-        throw Error(ErrorKind::Usage, fmt::format("a reference holds its eighths beside the image, which "
-                                                  "only EXR can: '{}' should end in .exr",
+        throw Error(ErrorKind::Usage, fmt::format("a reference stores eight parts next to the image, which "
+                                                  "only EXR can hold: '{}' should end in .exr",
                                                   request.output));
     if (request.samples > 0 && request.samples < kFolds)
         throw Error(ErrorKind::Usage, fmt::format("--spp must be at least {} for a reference", kFolds));
@@ -260,7 +260,8 @@ std::optional<MadeReference> renderReference(Scene scene, const ReferenceRequest
     const bool sampled = scene.integrator.nee;
     scene = referenceScene(std::move(scene), request.same_estimator);
     if (sampled && scene.integrator.nee && !request.same_estimator)
-        logInfo("light sampling stays on: nothing else finds point, spot, IES, beam and directional lights");
+        logInfo("light sampling stays on, because only it finds point, spot, IES, beam and directional "
+                "lights");
     Session session(request.backend, request.integrator);
     const std::optional<RenderedFolds> folds = renderFolds(scene, session, request, watch);
     if (!folds) return std::nullopt;
@@ -296,25 +297,27 @@ Reference readReference(const std::string& text, const Scene& scene) {
     const std::string content = metadataOf(image, kContentKey);
     if (content.empty())
         throw Error(ErrorKind::Usage,
-                    fmt::format("'{}' is no reference: make one with 'crt reference {} -o {}'", text,
+                    fmt::format("'{}' is not a reference: make one with 'crt reference {} -o {}'", text,
                                 scene.file, text));
     if (content != hashOfContent(scene)) {
         const std::vector<std::string> differences = differingContent(image, scene);
         throw Error(
             ErrorKind::Usage,
-            fmt::format("'{}' is a reference of another scene, or of this one with other settings: {}", text,
-                        differences.empty() ? "what differs was not noted"
+            fmt::format("'{}' is a reference for another scene, or for this one with other settings: {}",
+                        text,
+                        differences.empty() ? "the file does not tell the difference"
                                             : fmt::format("{}", fmt::join(differences, "; "))));
     }
     const std::string colour = metadataOf(image, kColourKey);
     if (colour.empty())
-        throw Error(ErrorKind::Usage, fmt::format("'{}' is of an earlier crt, which did not note exposure, "
-                                                  "colour space and white balance: make it again "
+        throw Error(ErrorKind::Usage, fmt::format("'{}' was written by an earlier crt, which did not store "
+                                                  "exposure, colour space and white balance: make it again "
                                                   "with 'crt reference'",
                                                   text));
     if (colour != colourText(scene))
         throw Error(ErrorKind::Usage,
-                    fmt::format("'{}' is a reference in other colours: it has {}; the scene has {}", text,
+                    fmt::format("'{}' is a reference with other colour settings: it has {}; the scene has "
+                                "{}", text,
                                 colour, colourText(scene)));
     reference.width = image.width;
     reference.height = image.height;
@@ -326,7 +329,8 @@ Reference readReference(const std::string& text, const Scene& scene) {
             channelsOf(image, {fmt::format("Fold.{}.R", fold), fmt::format("Fold.{}.G", fold),
                                fmt::format("Fold.{}.B", fold)});
         if (rgb.empty())
-            throw Error(ErrorKind::Usage, fmt::format("'{}' is no reference: it lacks its eighths", text));
+            throw Error(ErrorKind::Usage, fmt::format("'{}' is not a reference: it lacks the eight parts",
+                                                      text));
         reference.fold_luminance.push_back(stats::luminances(rgb, weights));
         reference.fold_rgb.emplace_back(rgb.begin(), rgb.end());
     }

@@ -213,7 +213,7 @@ MapSet mapsOfScene(const std::string& folder, const Run& run, const std::string&
         set.keys.push_back({"z = error / standard error", fmt::format("−{} too dark", kLargestZ),
                             fmt::format("+{} too bright", kLargestZ), hexColours(kDiverging)});
     if (flip)
-        set.keys.push_back({"FLIP, the difference as seen", "0 none", "1 largest", hexColours(kMagma)});
+        set.keys.push_back({"FLIP, the perceived difference", "0 none", "1 largest", hexColours(kMagma)});
     return set;
 }
 

@@ -38,7 +38,7 @@ Vary parseVary(const std::string& text) {
         for (const auto& [name, path] : shortNames()) names.push_back(name);
         const std::string hint = didYouMean(vary.key, names);
         throw Error(ErrorKind::Usage,
-                    fmt::format("--vary knows {} and keys of the scene such as film.filter, not '{}'{}",
+                    fmt::format("--vary takes {} and keys of the scene such as film.filter, not '{}'{}",
                                 fmt::join(names, ", "), vary.key, hint.empty() ? "" : "; " + hint));
     }
     vary.path = found != shortNames().end() ? found->second : vary.key;

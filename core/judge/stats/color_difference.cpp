@@ -44,7 +44,7 @@ void requireSameSize(const RgbView& a, const RgbView& b) {
     const std::size_t values = std::size_t{3} * a.width * a.height;
     if (a.width != b.width || a.height != b.height || a.values.size() != values || b.values.size() != values)
         throw Error(ErrorKind::Internal,
-                    "a metric of looks needs two images of one size, three values a pixel");
+                    "a perceptual metric needs two images of the same size with three values per pixel");
 }
 
 Color linearSrgbToXyz(const Color& rgb) { return product(kRgbToXyz, rgb); }

@@ -125,8 +125,8 @@ void judge(GateResult& result, const GateOptions& options) {
         fails = std::any_of(result.channels.begin(), result.channels.end(),
                             [](const GateResult::Channel& channel) { return channel.separated; });
         because(undecided,
-                fmt::format("one value carries {:.1f} % of all squared error, which normal noise does "
-                            "not: too few samples for its distribution",
+                fmt::format("one value carries {:.1f} % of the squared error, more than normal noise "
+                            "allows: more samples are needed",
                             100 * result.largest.share));
     }
     result.verdict = fails ? Verdict::Fail : undecided ? Verdict::Inconclusive : Verdict::Pass;
@@ -185,7 +185,7 @@ Replicates::Replicates(std::uint32_t width, std::uint32_t height, std::uint32_t 
 
 void Replicates::add(std::span<const double> image) {
     if (image.size() != pixels_.size())
-        throw Error(ErrorKind::Internal, "a replicate has another size than those before it");
+        throw Error(ErrorKind::Internal, "a replicate differs in size from the earlier ones");
     ++count_;
     const double n = static_cast<double>(count_);
     std::vector<double> tile_sums(tile_means_.size(), 0.0), image_sums(channels_, 0.0);
@@ -247,12 +247,13 @@ GateResult gate(const Replicates& a, const Replicates& b, const GateOptions& opt
     if (a.width() != b.width() || a.height() != b.height() || a.channels() != b.channels() ||
         a.count() < 2 || b.count() < 2)
         throw Error(ErrorKind::Internal,
-                    "the gate needs two sets of images of one size, two replicates or more in each");
+                    "the test needs two sets of images of the same size, with two replicates or more in "
+                    "each");
     GateResult result;
     result.not_finite = a.notFinite() + b.notFinite();
     if (result.not_finite > 0) {
         result.reasons.push_back(
-            fmt::format("{} values are no numbers: nothing can be said", result.not_finite));
+            fmt::format("{} values are NaN or infinite: the test is void", result.not_finite));
         return result;
     }
     const double alpha = 1 - options.confidence;

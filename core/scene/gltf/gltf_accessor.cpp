@@ -83,13 +83,13 @@ GltfAccessor::GltfAccessor(GltfFile& file, int index, std::string pointer)
     : file_(file), pointer_(std::move(pointer)) {
     const tinygltf::Model& model = file.model();
     if (index < 0 || static_cast<std::size_t>(index) >= model.accessors.size())
-        file.fail(pointer_, "it names no accessor");
+        file.fail(pointer_, "it refers to no accessor");
     const tinygltf::Accessor& accessor = model.accessors[static_cast<std::size_t>(index)];
     const std::string at = fmt::format("/accessors/{}", index);
     count_ = accessor.count;
     components_ = componentsOf(accessor.type);
     normalized_ = accessor.normalized;
-    if (components_ == 0) file.fail(at + "/type", "it is of no known type");
+    if (components_ == 0) file.fail(at + "/type", "its type is unknown");
     const bool sparse = accessor.sparse.isSparse && accessor.sparse.count > 0;
     if (accessor.bufferView >= 0) {
         const std::size_t stride =
@@ -102,7 +102,7 @@ GltfAccessor::GltfAccessor(GltfFile& file, int index, std::string pointer)
         file.fail(at, "it has no 'bufferView'");
     } else if (count_ > kMostZeroElements) {
         file.fail(at + "/count",
-                  fmt::format("{} elements without a buffer view are beyond any use", count_));
+                  fmt::format("{} elements without a buffer view are too many", count_));
     }
     if (!sparse) return;
     changed_ = static_cast<std::size_t>(accessor.sparse.count);
@@ -115,7 +115,7 @@ GltfAccessor::GltfAccessor(GltfFile& file, int index, std::string pointer)
     for (std::size_t i = 0; i < changed_; ++i)
         if (const std::uint32_t row = whole(changed_at_, i); row >= count_)
             file.fail(fmt::format("{}/sparse/indices", at),
-                      fmt::format("change {} is of element {}, and there are {}", i, row, count_));
+                      fmt::format("change {} refers to element {}, and there are {}", i, row, count_));
 }
 
 void GltfAccessor::requireComponents(std::size_t least, std::size_t most) const {

@@ -243,7 +243,7 @@ GltfFile::~GltfFile() = default;
 std::string GltfFile::pathOf(const std::string& uri, const std::string& pointer) const {
     const std::string shown = uri.substr(0, 100);
     if (const std::string scheme = schemeOf(uri); !scheme.empty())
-        fail(pointer, fmt::format("'{}' is no file beside this one: crt follows no '{}:'", shown,
+        fail(pointer, fmt::format("'{}' is not a local file: crt does not load '{}:' addresses", shown,
                                   scheme.substr(0, 20)));
     std::string name = percentDecoded(uri);
     if (name.find('\0') != std::string::npos) fail(pointer, "the name of the file has a zero byte");
@@ -266,7 +266,7 @@ std::optional<std::string> GltfFile::dataOf(const std::string& uri, const std::s
     if (comma == std::string::npos || std::string_view(uri).substr(0, comma).find(kBase64) == uri.npos)
         fail(pointer, "this data: URI has no ';base64,'");
     std::optional<std::string> bytes = base64Decoded(std::string_view(uri).substr(comma + 1));
-    if (!bytes) fail(pointer, "this data: URI has a character that is none of base 64");
+    if (!bytes) fail(pointer, "this data: URI has a character that is not base64");
     return bytes;
 }
 

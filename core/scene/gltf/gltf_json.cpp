@@ -43,7 +43,7 @@ void GltfJson::check() const {
 void GltfJson::checkAsset() const {
     if (!root.is_object()) file.fail("", fmt::format("expected an object, found {}", describeJson(root)));
     const auto asset = root.find("asset");
-    if (asset == root.end()) file.fail("", "this is no glTF: 'asset' is missing");
+    if (asset == root.end()) file.fail("", "this is not a glTF file: 'asset' is missing");
     requireObject(*asset, [] { return "/asset"; });
     const auto version = asset->find("version");
     if (version == asset->end() || !version->is_string())
@@ -64,12 +64,12 @@ void GltfJson::checkAsset() const {
         const std::string at = fmt::format("/extensionsRequired/{}", i);
         if (name == "KHR_draco_mesh_compression")
             file.fail(at,
-                      "its meshes are compressed by Draco, which crt does not read; export it without "
+                      "its meshes are compressed by Draco, which crt does not support; export it without "
                       "mesh compression");
         if (name == "EXT_meshopt_compression" || name == "KHR_meshopt_compression")
             file.fail(at,
-                      "its meshes are compressed by meshopt, which crt does not read; 'gltfpack "
-                      "-noq' without '-c' writes them plain");
+                      "its meshes are compressed by meshopt, which crt does not support; 'gltfpack -noq' "
+                      "without '-c' writes them uncompressed");
         if (name == "KHR_texture_basisu")
             file.fail(at,
                       "its textures are KTX2 files, which crt does not read; export them as PNG or JPEG");
@@ -125,7 +125,7 @@ void GltfJson::checkPrimitive(const Value& primitive, const std::string& at) con
     if (extensions != primitive.end() && extensions->is_object() &&
         extensions->contains("KHR_draco_mesh_compression"))
         file.fail(at,
-                  "this mesh is compressed by Draco, which crt does not read; export it without mesh "
+                  "this mesh is compressed by Draco, which crt does not support; export it without mesh "
                   "compression");
     const auto here = [&] { return at; };
     const auto attributes = primitive.find("attributes");
@@ -166,7 +166,7 @@ void GltfJson::checkWeights(const Value& of, const Value& mesh, const std::strin
     if (morphed && std::any_of(primitives.begin(), primitives.end(),
                                [](const Value& primitive) { return primitive.contains("targets"); }))
         file.fail(at + "/weights",
-                  "this mesh has morph targets in use, which crt does not have; apply them (shape keys) "
+                  "this mesh has active morph targets, which crt does not support; apply them (shape keys) "
                   "before the export");
 }
 

@@ -67,7 +67,7 @@ void readTriangles(GltfFile& file, const tinygltf::Primitive& primitive, const s
         for (std::size_t i = 0; i < indices.size(); ++i)
             if (indices[i] >= count)
                 file.fail(pointer + "/indices",
-                          fmt::format("element {} names vertex {}, and there are {}", i, indices[i], count));
+                          fmt::format("element {} uses vertex {}, and there are {}", i, indices[i], count));
     } else {
         indices.resize(mesh.positions.size());
         std::iota(indices.begin(), indices.end(), 0u);
@@ -158,7 +158,7 @@ Mesh readGltfPrimitive(GltfFile& file, const GltfPrimitive& which, std::uint64_t
         readUvs(file, *uvs, fmt::format("{}/attributes/{}", pointer, uv_name), mesh);
     const auto colors = attributes.find("COLOR_0", count);
     if (which.opacity && !colors)
-        file.fail(pointer + "/attributes", "'COLOR_0' is missing, whose alpha is asked for");
+        file.fail(pointer + "/attributes", "'COLOR_0' is missing, and 'vertex_opacity' needs its alpha");
     if (colors) {
         colors->requireComponents(3, 4);
         if (which.opacity) readOpacity(*colors, mesh);

@@ -69,7 +69,7 @@ int lightOf(const GltfFile& file, std::size_t index) {
     const int number = light.IsInt() ? light.GetNumberAsInt() : -1;
     if (number < 0 || static_cast<std::size_t>(number) >= file.model().lights.size())
         file.fail(fmt::format("/nodes/{}/extensions/KHR_lights_punctual/light", index),
-                  fmt::format("it is none of the file's {} lights", file.model().lights.size()));
+                  fmt::format("the file has only {} lights", file.model().lights.size()));
     return number;
 }
 
@@ -78,7 +78,7 @@ std::vector<int> rootsOf(const GltfFile& file, Losses& losses) {
     if (!model.scenes.empty()) {
         const std::size_t shown = model.defaultScene >= 0 ? static_cast<std::size_t>(model.defaultScene) : 0;
         for (std::size_t i = 1; i < model.scenes.size(); ++i)
-            losses.add("a scene beside the one that is shown");
+            losses.add("a scene other than the one shown");
         return model.scenes[shown].nodes;
     }
     std::vector<bool> is_child(model.nodes.size());
@@ -152,7 +152,7 @@ Matrix4d gltfBindPose(GltfFile& file, const GltfGraph& graph, const GltfPlaced& 
     const tinygltf::Model& model = file.model();
     const int number = model.nodes[static_cast<std::size_t>(placed.node)].skin;
     if (number < 0) return placed.world;
-    losses.add("a skin: its mesh stands as it was bound");
+    losses.add("a skin: its mesh keeps the pose in which it was bound");
     const tinygltf::Skin& skin = model.skins[static_cast<std::size_t>(number)];
     if (skin.joints.empty()) return placed.world;
     const Matrix4d& joint = graph.world[static_cast<std::size_t>(skin.joints[0])];

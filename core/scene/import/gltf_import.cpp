@@ -51,7 +51,7 @@ public:
     std::string text() {
         const std::string objects = objectsText();
         if (objects.empty())
-            file_.fail("/scenes", "there is nothing to see: no node of the scene has a mesh of triangles");
+            file_.fail("/scenes", "nothing is visible: no node of the scene has a mesh of triangles");
         std::string all = cameraText();
         all += environmentText() + lightsText();
         all += "\nmaterials:\n" + materials_.text();
@@ -161,9 +161,8 @@ void Writer::noteTangents(std::size_t mesh, std::size_t primitive, std::size_t u
         readGltfPrimitive(file_, {.mesh = mesh, .primitive = primitive, .uv_set = uv_set}, without_area);
     if (hasOtherTangents(read, readGltfTangents(file_, mesh, primitive)))
         losses_.add(
-            "tangents (TANGENT) that differ from those of the texture coordinates, by which crt turns "
-            "normal "
-            "maps");
+            "tangents (TANGENT) that differ from those of the texture coordinates, which crt uses for "
+            "normal maps");
 }
 
 /// An object for each primitive, placed as often as its mesh is.
@@ -257,11 +256,11 @@ std::string Writer::cameraText() {
     for (const GltfPlaced& placed : graph_.cameras) {
         const tinygltf::Camera& own = model_.cameras[static_cast<std::size_t>(placed.what)];
         if (own.type != "perspective") {
-            losses_.add("an orthographic camera, which crt does not have");
+            losses_.add("an orthographic camera, which crt does not support");
             continue;
         }
         if (!camera.empty()) {
-            losses_.add("a camera beside the first");
+            losses_.add("a second camera");
             continue;
         }
         const double yfov = own.perspective.yfov, given = own.perspective.aspectRatio;
@@ -313,9 +312,9 @@ std::string Writer::environmentBesideLights() const {
     constexpr double kMostMirrors = 0.5;
     if (!(mirroring_extent_ > kMostMirrors * extent_)) return {};
     losses_.choose(
-        "a grey sky beside the file's lights, since most of it is metal or glass, which show what surrounds "
-        "them (`--set environment=null` leaves it out)");
-    return chosenSky("most of the file is metal or glass, which show what surrounds them",
+        "a grey sky in addition to the file's lights, since most surfaces are metal or glass, which reflect "
+        "their surroundings (`--set environment=null` leaves it out)");
+    return chosenSky("most surfaces of the file are metal or glass, which reflect their surroundings",
                      std::exp2(-exposure()));
 }
 
@@ -336,9 +335,9 @@ std::string Writer::lightsText() const {
         if (!std::all_of(light.color.begin(), light.color.end(),
                          [](double c) { return c >= 0 && c < 1e6; }) ||
             !(amount >= 0 && amount < 1e20))
-            file_.fail(pointer, "its colour or intensity is below 0, or beyond any use");
+            file_.fail(pointer, "its colour or intensity is negative or too large");
         if (amount == 0) continue;
-        if (light.range > 0) losses_.add("the range of a light: light reaches as far as it goes");
+        if (light.range > 0) losses_.add("the range of a light: light in crt has no range limit");
         std::string keys;
         const std::string position = "position: " + yamlList(pointAt(placed.world, {0, 0, 0}));
         if (light.type == "point") {
@@ -352,7 +351,8 @@ std::string Writer::lightsText() const {
         } else if (light.type == "spot") {
             const double outer = light.spot.outerConeAngle, inner = light.spot.innerConeAngle;
             if (!(inner >= 0 && inner <= outer && outer > 0 && outer <= std::numbers::pi))
-                file_.fail(pointer + "/spot", "its angles are not 0 to the outer one, which is at most pi");
+                file_.fail(pointer + "/spot", "its inner angle must be between 0 and the outer one, and the "
+                                              "outer one at most pi");
             keys = fmt::format(
                 "type: spot, {}, direction: {}, cone_angle_deg: {}, penumbra_deg: {}, "
                 "luminous_intensity_cd: {}",
@@ -373,10 +373,10 @@ std::string Writer::lightsText() const {
 std::string gltfScene(GltfFile& file, const std::string& file_name, const std::string& folder,
                       bool allow_outside, Losses& losses) {
     const tinygltf::Model& model = file.model();
-    if (file.animationCount() > 0) losses.add("animations: everything stands as before them");
+    if (file.animationCount() > 0) losses.add("animations: objects keep their initial places");
     for (const std::string& name : model.extensionsUsed)
         if (name == "KHR_materials_variants")
-            losses.add("variants of materials: those that the file has without one");
+            losses.add("variants of materials: crt uses the default materials");
         else if (!knowsGltfExtension(name))
             losses.add(fmt::format("the extension '{}'", name.substr(0, 60)));
     return Writer(file, file_name, folder, allow_outside, losses).text();

@@ -104,7 +104,8 @@ std::optional<GltfTexture> GltfMaterials::usable(Source& source, std::optional<G
     }
     if (source.set && *source.set != texture->set) {
         losses_.add(
-            fmt::format("{} of '{}': a mesh has one set of coordinates, and it has another", what, name));
+            fmt::format("{} of '{}': it uses a second set of texture coordinates, and a mesh has one",
+                        what, name));
         return std::nullopt;
     }
     if (!textures_.canRead(*texture)) return std::nullopt;
@@ -141,7 +142,7 @@ void GltfMaterials::readColor(Source& source, Surface& surface) {
         const bool plain = surface.color_factor == kWhite;
         surface.color = textures_.form(*texture, plain ? "" : ", factor: " + yamlList(surface.color_factor));
         if (source.use.colors)
-            losses_.add("colours of vertices beside a texture, whose product crt has not");
+            losses_.add("colours of vertices together with a texture: crt does not multiply them");
     } else if (source.use.colors) {
         surface.color = "{attribute: colors}";
         source.text.color_factor = surface.color_factor;
@@ -208,7 +209,8 @@ void GltfMaterials::readVertexOpacity(Source& source, Surface& surface) {
         (material.alphaMode != "MASK" && material.alphaMode != "BLEND"))
         return;
     if (source.set)
-        return losses_.add("the alpha of vertices beside a texture: the opacity is that of the texture");
+        return losses_.add("the alpha of vertices together with a texture: crt uses the opacity of the "
+                           "texture");
     const std::vector<double>& color = material.pbrMetallicRoughness.baseColorFactor;
     const double factor = color.size() > 3 ? unitOf(color[3]) : 1,
                  cutoff = std::max(material.alphaCutoff, 0.0);
@@ -230,7 +232,7 @@ void GltfMaterials::readNormals(Source& source, Surface& surface) {
     if (!texture) return;
     if (!textures_.hasColors(*texture)) return losses_.add("a normal map that is grey");
     if (info.scale < 0 || info.scale > 100)
-        losses_.add("the scale of a normal map, which is none of 0 to 100");
+        losses_.add("the scale of a normal map, which is not in 0 to 100");
     const double strength = std::clamp(info.scale, 0.0, 100.0);
     source.text.normal_map = true;
     surface.normal_map =
@@ -241,7 +243,7 @@ void GltfMaterials::readNormals(Source& source, Surface& surface) {
 void GltfMaterials::readDielectric(Source& source, Surface& surface) {
     double ior = gltfNumber(gltfExtension(source.material, "KHR_materials_ior"), "ior", 1.5);
     if (ior < 1 || ior > 10) {
-        losses_.add("an index of refraction that is none of 1 to 10: 1.5");
+        losses_.add("an index of refraction that is not in 1 to 10: crt uses 1.5");
         ior = 1.5;
     }
     surface.pane_ior = yamlNumber(ior);
@@ -276,7 +278,8 @@ void GltfMaterials::readClear(Source& source, Surface& surface) {
     }
     surface.clear = share;
     surface.all_clear = share == "1";
-    if (volume.Has("thicknessTexture")) losses_.add("a texture of thickness: the mesh is the body itself");
+    if (volume.Has("thicknessTexture")) losses_.add("a texture of thickness: crt uses the mesh itself as "
+                                                    "the body");
     if (surface.color.starts_with("{texture")) losses_.add("a texture that tints what glass lets through");
     // What is left after the thickness: of the base colour once, and of the attenuation.
     const double distance = gltfNumber(volume, "attenuationDistance", 0);
@@ -292,7 +295,7 @@ void GltfMaterials::readClear(Source& source, Surface& surface) {
             gltfNumber(gltfExtension(source.material, "KHR_materials_dispersion"), "dispersion", 0);
         dispersion > 0) {
         surface.dielectric.emplace_back("transmission_dispersion_scale", yamlNumber(unitOf(dispersion)));
-        if (dispersion > 1) losses_.add("a dispersion above 1: 1");
+        if (dispersion > 1) losses_.add("a dispersion above 1: crt uses 1");
     }
     if (left == kWhite) return;
     surface.absorbs = true;
@@ -314,7 +317,7 @@ void GltfMaterials::readCoat(Source& source, Surface& surface) {
                    "the texture of the clear coat's roughness")) {
         const TexelStatistics& texels = textures_.statistics(*texture);
         if (!texels.isConstant(1) && rough > 0)
-            losses_.add("the texture of a clear coat's roughness: its mean");
+            losses_.add("the texture of a clear coat's roughness: crt uses its mean");
         rough *= texels.mean[1];
     }
     if (coat.Has("clearcoatNormalTexture")) losses_.add("the normal map of a clear coat");
@@ -332,13 +335,13 @@ void GltfMaterials::readFuzz(Source& source, Surface& surface) {
         if (const auto texture = usable(source, textures_.named(sheen, "sheenColorTexture", source.pointer),
                                         "the texture of the sheen")) {
             const TexelStatistics& texels = textures_.statistics(*texture);
-            if (!texels.isConstant()) losses_.add("the texture of a sheen: its mean");
+            if (!texels.isConstant()) losses_.add("the texture of a sheen: crt uses its mean");
             for (std::size_t k = 0; k < 3; ++k) color[k] *= texels.linear_mean[k];
         }
     const double most = gltfLargest(color);
     if (most == 0) return;
     if (sheen.Has("sheenRoughnessTexture")) losses_.add("the texture of a sheen's roughness");
-    losses_.add("sheen: fuzz of OpenPBR, which is another model");
+    losses_.add("sheen: crt uses the fuzz of OpenPBR, a different model");
     for (double& c : color) c /= most;
     surface.layers.emplace_back("fuzz_weight", yamlNumber(most));
     surface.layers.emplace_back("fuzz_color", colorText(color));
@@ -354,7 +357,7 @@ void GltfMaterials::readEmission(Source& source) {
         color[k] = std::max(source.material.emissiveFactor[k], 0.0);
     if (gltfLargest(color) == 0) return;
     // Up to 1 says the standard, but older exporters put the strength here.
-    if (!(gltfLargest(color) < 1e6)) file_.fail(source.pointer + "/emissiveFactor", "it is beyond any use");
+    if (!(gltfLargest(color) < 1e6)) file_.fail(source.pointer + "/emissiveFactor", "it is too large");
     const double strength = std::clamp(
         gltfNumber(gltfExtension(source.material, "KHR_materials_emissive_strength"), "emissiveStrength", 1),
         0.0, 1e15);
@@ -367,7 +370,7 @@ void GltfMaterials::readEmission(Source& source) {
         if (!texture) return;
         const TexelStatistics& texels = textures_.statistics(*texture);
         if (!texels.isConstant())
-            return losses_.add("light that a texture says: crt's lamps are equally bright everywhere");
+            return losses_.add("emissive texture: crt only supports uniform emission");
         for (std::size_t k = 0; k < 3; ++k) color[k] *= texels.linear_mean[k];
     }
     const double most = gltfLargest(color);
@@ -381,7 +384,8 @@ void GltfMaterials::readEmission(Source& source) {
 bool GltfMaterials::readUnlit(Source& source) {
     if (!hasExtension(source.material, "KHR_materials_unlit")) return false;
     if (source.use.colors || source.material.pbrMetallicRoughness.baseColorTexture.index >= 0) {
-        losses_.add("an unlit material of a texture or colours of vertices: it is lit, and diffuse");
+        losses_.add("an unlit material with a texture or colours of vertices: crt makes it diffuse, and "
+                    "lights it");
         return false;
     }
     Surface surface;
@@ -409,10 +413,10 @@ void GltfMaterials::write(const std::string& name, const Surface& s) {
     const bool glossy = dielectric && !s.all_clear;
     if (textured && glossy)
         losses_.add(
-            "the texture of a dielectric's roughness: its mean, since crt's gloss is equally rough "
-            "everywhere");
+            "the texture of a dielectric's roughness: crt uses its mean, since its gloss has a uniform "
+            "roughness");
     if (textured && s.rough_coat && metal)
-        losses_.add("the texture of the roughness under a rough coat: its mean");
+        losses_.add("the texture of the roughness under a rough coat: crt uses its mean");
     const auto roughness = [&](bool as_texture) {
         return as_texture && textured ? s.rough_texture : yamlNumber(s.rough);
     };
@@ -469,7 +473,7 @@ const GltfMaterialText& GltfMaterials::of(const GltfMaterialUse& use) {
     text.name = names_.take(material.name, own ? fmt::format("material {}", use.material) : "standard");
     Source source{material, use, text, pointer, {}};
     if (material.occlusionTexture.index >= 0)
-        losses_.add("textures of ambient occlusion, which light itself makes here");
+        losses_.add("textures of ambient occlusion: crt computes occlusion itself");
     if (readUnlit(source)) return text;
     Surface surface;
     read(source, surface);
@@ -504,7 +508,7 @@ void GltfMaterials::readIridescence(const Source& source, Surface& surface) {
     const double factor = unitOf(gltfNumber(film, "iridescenceFactor", 0));
     if (factor <= 0) return;
     if (!surface.all_clear || surface.metal != 0 || !surface.metal_texture.empty())
-        return losses_.add("iridescence of what is not glass");
+        return losses_.add("iridescence of a material other than glass");
     const double thickness = std::clamp(gltfNumber(film, "iridescenceThicknessMaximum", 400), 0.0, 20000.0);
     surface.dielectric.emplace_back("thin_film_weight", yamlNumber(factor));
     surface.dielectric.emplace_back("thin_film_thickness", yamlNumber(thickness / 1000));

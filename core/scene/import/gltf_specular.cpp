@@ -149,8 +149,8 @@ std::optional<tinygltf::Material> withoutSpecularGlossiness(const tinygltf::Mate
     if (cutoff && shows_diffuse) {
         constexpr double kUsual = 0.04;
         losses.add(
-            "specular colour and glossiness by a texture: metal where it is bright, else a reflection "
-            "of 4 %, and the mean glossiness");
+            "specular colour and glossiness by a texture: crt uses metal where it is bright, elsewhere a "
+            "reflection of 4 %, and the mean glossiness");
         metal = GltfMetalParts{metalOf(material, said), said.specular_image, *cutoff};
         return dielectricOf(material, said, kUsual, 1 - kUsual);
     }
@@ -158,15 +158,15 @@ std::optional<tinygltf::Material> withoutSpecularGlossiness(const tinygltf::Mate
     if (is_metal && !(said.diffuse_image && shows_diffuse)) {
         tinygltf::Material result = metalOf(material, said);
         if (!said.specular_image) return result;
-        losses.add("glossiness by a texture: its mean");
+        losses.add("glossiness by a texture: crt uses its mean");
         if (material.alphaMode != "OPAQUE") {
             losses.add("the opacity of a metal by specular colour");  // That alpha is glossiness.
             result.alphaMode = "OPAQUE";
         }
         return result;
     }
-    if (is_metal) losses.add("a metal with a texture of diffuse colour: a dielectric");
-    if (said.specular_image) losses.add("specular colour and glossiness by a texture: their means");
+    if (is_metal) losses.add("a metal with a texture of diffuse colour: crt makes it a dielectric");
+    if (said.specular_image) losses.add("specular colour and glossiness by a texture: crt uses their means");
     // The index by what is reflected straight on; colour has no place in it.
     if (specular[0] != specular[1] || specular[1] != specular[2])
         losses.add("the colour of specular reflections of a dielectric");

@@ -94,7 +94,7 @@ std::optional<GltfTexture> GltfTextures::named(int index, int set, const tinyglt
         texture.rotation = gltfNumber(*transform, "rotation", 0);
         set = static_cast<int>(std::clamp(gltfNumber(*transform, "texCoord", set), 0.0, 99.0));
     }
-    if (set < 0 || set > 7) file_.fail(pointer + "/texCoord", "it is none of 0 to 7");
+    if (set < 0 || set > 7) file_.fail(pointer + "/texCoord", "it is not in 0 to 7");
     texture.set = static_cast<std::size_t>(set);
     return texture;
 }
@@ -185,7 +185,7 @@ std::string GltfTextures::form(const GltfTexture& texture, const std::string& mo
         if (sampler.wrapS == TINYGLTF_TEXTURE_WRAP_MIRRORED_REPEAT) text += ", wrap: mirror";
         if (sampler.magFilter == TINYGLTF_TEXTURE_FILTER_NEAREST) text += ", filter: nearest";
         if (sampler.wrapS != sampler.wrapT)
-            losses_.add("a texture that is repeated otherwise along v: as along u");
+            losses_.add("a texture with different repetition along v: crt repeats it as along u");
     }
     return text + placement(texture) + "}";
 }

@@ -45,7 +45,8 @@ void requireUtf8(const std::string& path, std::string_view name) {
         if (utf8Length(name.substr(i)) == 0)
             throw Error(
                 ErrorKind::Scene,
-                fmt::format("{}: error: its name is not UTF-8, and a scene cannot name it; rename it", path),
+                fmt::format("{}: error: its name is not UTF-8, so a scene cannot refer to it; rename it",
+                            path),
                 {path});
 }
 
@@ -54,7 +55,7 @@ std::unique_ptr<LoadedMesh> visibleMesh(LoadedMesh mesh, const std::string& path
     if (mesh.mesh.triangles.empty())
         throw Error(
             ErrorKind::Scene,
-            fmt::format("{}: error: no face of this mesh has an area: there is nothing to see", path),
+            fmt::format("{}: error: no face of this mesh has an area: nothing is visible", path),
             {path});
     return std::make_unique<LoadedMesh>(std::move(mesh));
 }
@@ -73,7 +74,7 @@ std::string otherRendererOf(const std::string& path) {
 }
 
 std::string importHint(const std::string& path) {
-    return fmt::format("crt's Python package makes a scene of it: python3 -m crt import {} -o scene.yaml",
+    return fmt::format("crt's Python package converts it: python3 -m crt import {} -o scene.yaml",
                        path);
 }
 
@@ -115,12 +116,12 @@ ImportedModel importModel(GltfFiles& files, const std::string& path, const Impor
     }
     std::string text = fmt::format("# {}, imported by crt.\n{}", inOneLine(name), about);
     if (const std::vector<std::string> lost = losses.list(); !lost.empty()) {
-        logWarning("{}: not in the scene as in the file: {}", path, fmt::join(lost, "; "));
+        logWarning("{}: ignored or approximated: {}", path, fmt::join(lost, "; "));
         text += "# Not as in the file:\n";
         for (const std::string& loss : lost) text += fmt::format("#   - {}\n", inOneLine(loss));
     }
     if (!losses.chosen().empty())
-        logInfo("{}: not in the file, and chosen: {}", path, fmt::join(losses.chosen(), "; "));
+        logInfo("{}: not in the file, so crt chose: {}", path, fmt::join(losses.chosen(), "; "));
     const std::string stem = file.stem().string();
     text = fmt::format("{}crt: 1\ntitle: {}\n{}\noutputs:\n  - {{file: {}}}\n", text, yamlText(stem), body,
                        yamlText(stem + ".png"));

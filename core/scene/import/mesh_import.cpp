@@ -67,9 +67,9 @@ std::string viewText(const Mesh& mesh, const std::optional<double>& brightness, 
     text += "film: {resolution: [960, 640]}\nsampler: {samples: 128}\n";
     if (brightness && *brightness < kAlmostBlack) {
         losses.choose(
-            "a grey sky beside the file's lights, which are too weak to show it (`--set environment=null` "
+            "a grey sky in addition to the file's lights, which are too weak (`--set environment=null` "
             "leaves it out)");
-        return text + chosenSky("the lights of the file are too weak to show it", 1);
+        return text + chosenSky("the lights of the file are too weak", 1);
     }
     if (brightness) return text;
     losses.choose(inner ? "a grey sky and a lamp at the camera" : "a grey sky and a lamp");
@@ -105,7 +105,7 @@ std::string objScene(const LoadedMesh& loaded, const std::string& file_name, Los
 std::string plyScene(const Mesh& mesh, const std::string& file_name, Losses& losses) {
     std::string text = viewText(mesh, std::nullopt, losses);
     const bool colored = !mesh.colors.empty();
-    losses.choose(colored ? "a matt material of the colours of its vertices" : "a grey material");
+    losses.choose(colored ? "a matt material with the colours of its vertices" : "a grey material");
     text += fmt::format("\nmaterials:\n  surface: {{type: diffuse, reflectance: {}}}\n",
                         colored ? "{attribute: colors}" : "0.5");
     text += fmt::format("\nobjects:\n  - name: {}\n    ply: {}\n    material: surface\n",

@@ -117,10 +117,10 @@ std::string chosenCamera(const Bounds& bounds, const std::optional<InnerView>& i
             yamlList(position), yamlList(target), yamlNumber(fov_deg));
     };
     if (inner) {
-        losses.choose("a camera within it, which sees more of its materials than any around it");
+        losses.choose("a camera inside it, where it sees more of the materials than from outside");
         return section(inner->position, inner->target, inner->fov_deg);
     }
-    losses.choose("a camera that sees all of it");
+    losses.choose("a camera that sees the whole model");
     constexpr double kMargin = 1.05;
     const Vec3d back = backOfChosenCamera(kChosenTurn_deg);
     const Vec3d across = cross({0, 1, 0}, back), right = across * (1 / length(across)),

@@ -162,7 +162,7 @@ private:
         const std::string file = path.string();
         if (std::find(out_.files.begin(), out_.files.end(), file) != out_.files.end()) return;
         if (path != folder_ / name)
-            logWarning("{}:{}: there is no material file {}; read {} in its place", obj_path_, line,
+            logWarning("{}:{}: the material file {} does not exist; crt read {} instead", obj_path_, line,
                        inQuotes(name), inQuotes(file));
         std::string text;
         try {

@@ -252,13 +252,14 @@ private:
         if (out_.degenerate_faces > 0)
             logWarning("{}: {} without area left out", path_, counted(out_.degenerate_faces, "triangle"));
         if (flat_faces_ > 0 && wild_normals_.count > 0)
-            logWarning("{}:{}: {} shaded flat: a normal of theirs is not in the file, which has {}", path_,
+            logWarning("{}:{}: {} shaded flat: they use a normal that is not in the file, which has {}",
+                       path_,
                        wild_normals_.line, counted(flat_faces_, "face"), obj_.normals.size());
         else if (flat_faces_ > 0 && obj_.bad_normals.count > 0)
             logWarning("{}:{}: {}; {} shaded flat for such normals", path_, obj_.bad_normals.line,
                        obj_.bad_normals.sentence, counted(flat_faces_, "face"));
         else if (flat_faces_ > 0)
-            logWarning("{}: {} shaded flat: a normal of theirs has no direction", path_,
+            logWarning("{}: {} shaded flat: one of their normals has no direction", path_,
                        counted(flat_faces_, "face"));
         if (obj_.bad_uvs.count > 0)
             logWarning("{}:{}: {}; taken for (0, 0), as {} in all", path_, obj_.bad_uvs.line,
@@ -288,15 +289,16 @@ private:
             const std::size_t more = undefined.size() > kMostNamed ? undefined.size() - kMostNamed : 0;
             undefined.resize(undefined.size() - more);
             logWarning(
-                "{}: material{} {}{} not defined{}: {} of {} have none of their own", path_,
+                "{}: material{} {}{} not defined{}: {} of {} have no material", path_,
                 undefined.size() + more == 1 ? "" : "s", fmt::join(undefined, ", "),
                 more > 0                ? fmt::format(" and {} more are", more)
                 : undefined.size() == 1 ? " is"
                                         : " are",
-                files_.missing.empty() ? "" : fmt::format(", and no file {} is there", missingFiles()), bare,
+                files_.missing.empty() ? "" : fmt::format(", and the file {} does not exist",
+                                                          missingFiles()), bare,
                 counted(out_.mesh.triangles.size(), "triangle"));
         } else if (!files_.missing.empty()) {
-            logWarning("{}: no material file {} is there", path_, missingFiles());
+            logWarning("{}: the material file {} does not exist", path_, missingFiles());
         }
         std::vector<std::string> left_out = otherGeometry();
         if (obj_.vertex_colors) left_out.push_back("colours of vertices");
@@ -332,7 +334,7 @@ private:
 ObjContents readContents(const std::string& path) {
     Stage stage("reading " + std::filesystem::path(path).filename().string());
     const std::string text = readTextFile(path, "mesh", kMostMeshBytes, {path});
-    if (beginsAsPly(text)) failMesh("this is a PLY file; name it by 'ply:' in place of 'obj:'", path);
+    if (beginsAsPly(text)) failMesh("this is a PLY file; use 'ply:' instead of 'obj:'", path);
     if (const std::string format = otherFormat(text); !format.empty())
         failMesh(fmt::format("this is {}; crt reads OBJ", format), path);
     ObjContents obj = readObj(text, path, stage);

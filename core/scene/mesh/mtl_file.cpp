@@ -35,7 +35,7 @@ const std::vector<MtlKey>& mtlKeys() {
          "r g b, or one number",
          "Reflectance of a mirror by `illum` 3 or 5. Elsewhere a highlight, which is left out: "
          "`illum` 0 and 1 say that there is none, other values bring a warning."},
-        {"Ka", {}, "r g b", "Ignored: light that comes from nowhere has no place in light transport."},
+        {"Ka", {}, "r g b", "Ignored: ambient light has no place in light transport."},
         {"Ni",
          {},
          "n",
@@ -49,12 +49,13 @@ const std::vector<MtlKey>& mtlKeys() {
         {"Tr",
          {},
          "1 − opacity",
-         "As `d`, which wins where both are there. MeshLab, vcglib and OpenMVS write `Tr 1` for opaque "
+         "As `d`, which takes precedence if both are present. MeshLab, vcglib and OpenMVS write `Tr 1` for "
+         "opaque "
          "surfaces, without `Ni`."},
         {"Tf",
          {"Kt"},
          "r g b, or one number",
-         "Says that light passes, and with `Ni` above 1 makes clear glass, unless it is black or white: "
+         "Means that light passes, and with `Ni` above 1 makes clear glass, unless it is black or white: "
          "3ds Max and Maya write `Tf 1 1 1` for everything. Its colour is left out, with a warning."},
         {"illum",
          {},
@@ -69,13 +70,14 @@ const std::vector<MtlKey>& mtlKeys() {
         {"crt_reflectance",
          {},
          "file",
-         "A measured spectrum (`.spd`, `.csv`) in place of Kd or Ks, looked up beside the MTL; clamped "
+         "A measured spectrum (`.spd`, `.csv`) in place of Kd or Ks, looked up in the folder of the MTL; "
+         "clamped "
          "beyond its ends. Known to crt only."},
         {"Ns",
          {},
          "exponent",
-         "Left out: highlights are, and mirrors and glass are smooth. A warning where Ns or Pr make them "
-         "visibly rough."},
+         "Left out, because crt leaves out highlights, and mirrors and glass are smooth. A warning if Ns or "
+         "Pr make them visibly rough."},
         {"Pr", {}, "roughness", "As `Ns`."},
         {"Ps", {}, "sheen", "Left out, with a warning if not 0."},
         {"Pc", {}, "coat thickness", "Left out, with a warning if not 0."},
@@ -85,10 +87,12 @@ const std::vector<MtlKey>& mtlKeys() {
         {"map_Kd",
          {},
          "image",
-         "A texture that takes the place of `Kd`, where `vt` say how it lies: sRGB for 8 and 16 bits. "
-         "Looked up beside the MTL, with `/` for `\\`, without its folders, in another case. `-s`, `-o` and "
-         "`-clamp` are read. Where the file is not there or cannot be read, with a warning, `Kd` counts; a "
-         "black one, which exporters write beside a texture, as grey 0.6."},
+         "A texture that replaces `Kd`, on faces with `vt`: sRGB for 8 and 16 bits. "
+         "Looked up in the folder of the MTL, with `/` for `\\`, without its folders, and in another letter "
+         "case. "
+         "`-s`, `-o` and "
+         "`-clamp` are read. If the file cannot be read, crt warns and uses `Kd`; a black `Kd`, which "
+         "exporters write together with a texture, counts as grey 0.6."},
         {"map_Ka", {}, "image", "Ignored, as `Ka`."},
         {"map_Ks", {}, "image", "Left out, with a warning."},
         {"map_Ns", {}, "image", "Left out, with a warning."},
@@ -96,9 +100,9 @@ const std::vector<MtlKey>& mtlKeys() {
         {"map_d",
          {"map_Tr", "map_opacity"},
          "image",
-         "Takes the place of `d`, as `map_Kd` that of `Kd`: white is there, black is not. Of coloured "
-         "images red, or what `-imfchan` says (`r`, `g`, `b`, `m` for alpha); alpha where it is the image "
-         "of `map_Kd`. Left out, with a warning, where the file is not there, and of glass."},
+         "Replaces `d`, as `map_Kd` replaces `Kd`: white is opaque, black is a hole. Coloured images give "
+         "red, or the channel of `-imfchan` (`r`, `g`, `b`, `m` for alpha); alpha if it is the image of "
+         "`map_Kd`. Left out, with a warning, for glass and if the file does not exist."},
         {"map_Pr", {}, "image", "Left out, with a warning."},
         {"map_Pm", {}, "image", "Left out, with a warning."},
         {"map_Ps", {}, "image", "Left out, with a warning."},
@@ -109,9 +113,8 @@ const std::vector<MtlKey>& mtlKeys() {
         {"norm",
          {"map_Kn", "map_norm"},
          "image",
-         "A normal map, as `normal_map` of materials. Left out, with a warning, of glass and where the file "
-         "is "
-         "not there."},
+         "A normal map, as `normal_map` of materials. Left out, with a warning, for glass and if the file "
+         "does not exist."},
         {"sharpness", {}, "number", "Ignored: it belongs to reflection maps."},
         {"map_aat", {}, "on or off", "Ignored: it belongs to textures."},
     };

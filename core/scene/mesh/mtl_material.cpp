@@ -243,7 +243,8 @@ private:
         if (map_kd_) return {kUnstatedKd, kUnstatedKd, kUnstatedKd};  // unless the image cannot be read
         if (emits() || has("crt_reflectance")) return {};
         summary_.decided(
-            fmt::format("{} read as grey {}", replaced ? "a black Kd beside map_Kd" : "no Kd", kUnstatedKd));
+            fmt::format("{} read as grey {}", replaced ? "a black Kd together with "
+                                                         "map_Kd" : "no Kd", kUnstatedKd));
         return {kUnstatedKd, kUnstatedKd, kUnstatedKd};
     }
 
@@ -379,7 +380,7 @@ std::string MtlSummary::text() const {
     if (!dropped_.empty()) text += "; dropped: " + list(dropped_);
     if (!not_there_.empty())
         text +=
-            fmt::format("; there is no image {}{}", inQuotes(*not_there_.begin()),
+            fmt::format("; the image {}{} does not exist", inQuotes(*not_there_.begin()),
                         not_there_.size() == 1 ? "" : fmt::format(" and {} more", not_there_.size() - 1));
     if (!unknown_.empty()) text += "; unknown: " + list(unknown_);
     if (!unreadable_.empty()) text += "; not understood:";

@@ -181,7 +181,7 @@ private:
         const std::string_view position = field.substr(0, field.find('/'));
         std::int64_t at = 0;
         if (!readIndex(position, at))
-            fail(fmt::format("{} is not a corner of a face (v, v/vt, v//vn or v/vt/vn, counted from 1)",
+            fail(fmt::format("{} is not a face corner; expected v, v/vt, v//vn or v/vt/vn, counted from 1",
                              inQuotes(field)));
         if (at < 0)
             addBackwards(number, at, part_.positions.size(), ObjPart::Backwards::What::Position);
@@ -365,7 +365,7 @@ private:
                 target = static_cast<std::uint32_t>(index);
             else if (b.what == What::Position)
                 throw Error(ErrorKind::Scene,
-                            fmt::format("a face names vertex {}, but only {} stand before it", b.written,
+                            fmt::format("a face uses vertex {}, but only {} vertices precede it", b.written,
                                         place.positions + b.before),
                             {path_, place.line + b.line});
         }
@@ -464,7 +464,7 @@ private:
     [[noreturn]] void failForMissing(const Missing& missing) const {
         throw Error(
             ErrorKind::Scene,
-            fmt::format("a face names vertex {}, but the file has {}", missing.position + 1, positions_),
+            fmt::format("a face uses vertex {}, but the file has {}", missing.position + 1, positions_),
             {path_, missing.line});
     }
 

@@ -42,7 +42,7 @@ public:
             if (keyword == "end_header") break;
             statement(keyword, trimmed(rest));
         }
-        if (!format_) fail("the header of this PLY does not say its format");
+        if (!format_) fail("the header of this PLY lacks the format");
         header_.bytes = at_;
         header_.lines = line_;
         return std::move(header_);
@@ -79,7 +79,7 @@ private:
         } else if (keyword == "property") {
             property(rest);
         } else {
-            fail(fmt::format("{} is no statement of a PLY header", inQuotes(keyword)));
+            fail(fmt::format("{} is not a statement of a PLY header", inQuotes(keyword)));
         }
     }
 
@@ -108,9 +108,9 @@ private:
             std::from_chars(digits.data(), digits.data() + digits.size(), element.count);
         if (element.name.empty() || digits.empty() || error != std::errc() ||
             end != digits.data() + digits.size())
-            fail("an element has a name and a number: 'element vertex 8'");
+            fail("an element needs a name and a number: 'element vertex 8'");
         if (header_.find(element.name) != nullptr)
-            fail(fmt::format("the element {} is there twice", inQuotes(element.name)));
+            fail(fmt::format("the element {} occurs twice", inQuotes(element.name)));
         if (header_.elements.size() == kMost) fail("more than a thousand elements");
         header_.elements.push_back(std::move(element));
     }
@@ -118,13 +118,13 @@ private:
     PlyType type(std::string_view word) const {
         const std::optional<PlyType> known = typeOf(word);
         if (!known)
-            fail(fmt::format("{} is no type of PLY (char, uchar, short, ushort, int, uint, float, double)",
+            fail(fmt::format("{} is not a PLY type (char, uchar, short, ushort, int, uint, float, double)",
                              inQuotes(word)));
         return *known;
     }
 
     void property(std::string_view rest) {
-        if (header_.elements.empty()) fail("a property stands before the first element");
+        if (header_.elements.empty()) fail("a property precedes the first element");
         PlyElement& element = header_.elements.back();
         std::string_view word = nextField(rest);
         std::optional<PlyType> count;
@@ -135,10 +135,10 @@ private:
         }
         const PlyType of = type(word);
         const std::string name(nextField(rest));
-        if (name.empty()) fail("a property has a type and a name: 'property float x'");
+        if (name.empty()) fail("a property needs a type and a name: 'property float x'");
         if (element.find(name) != nullptr)
             fail(
-                fmt::format("the property {} of {} is there twice", inQuotes(name), inQuotes(element.name)));
+                fmt::format("the property {} of {} occurs twice", inQuotes(name), inQuotes(element.name)));
         if (element.properties.size() == kMost) fail("an element with more than a thousand properties");
         element.properties.push_back({name, of, count});
     }

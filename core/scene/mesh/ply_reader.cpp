@@ -167,7 +167,7 @@ private:
                           std::size_t vertex, int line, MeshLoss& loss) {
         const Vec3d v{number[first], number[first + 1], number[first + 2]};
         if (std::isfinite(v[0]) && std::isfinite(v[1]) && std::isfinite(v[2])) return v;
-        loss.add(line, fmt::format("the {} of vertex {} is no finite number", what, vertex));
+        loss.add(line, fmt::format("the {} of vertex {} is not finite", what, vertex));
         constexpr double kNoNumber = std::numeric_limits<double>::quiet_NaN();
         return {kNoNumber, kNoNumber, kNoNumber};
     }
@@ -240,7 +240,7 @@ private:
         for (const std::int64_t corner : row.corners) {
             if (corner < 0 || static_cast<std::uint64_t>(corner) >= mesh.positions.size())
                 throw BadPlyRow{
-                    fmt::format("names vertex {}, but the file has {}", corner, mesh.positions.size())};
+                    fmt::format("uses vertex {}, but the file has {}", corner, mesh.positions.size())};
             const auto vertex = static_cast<std::size_t>(corner);
             polygon.push_back(mesh.positions[vertex]);
             lost_position |= !isNumber(polygon.back());
@@ -370,7 +370,7 @@ private:
             logWarning("{}: {}; {} shaded flat for such normals", at(l.bad_normals), l.bad_normals.sentence,
                        counted(l.flat_faces, "face"));
         else if (l.flat_faces > 0)
-            logWarning("{}: {} shaded flat: a normal of theirs has no direction", path_,
+            logWarning("{}: {} shaded flat: one of their normals has no direction", path_,
                        counted(l.flat_faces, "face"));
         if (l.bad_uvs.count > 0)
             logWarning("{}: {}; as {} in all, which are left out", at(l.bad_uvs), l.bad_uvs.sentence,
@@ -414,9 +414,9 @@ private:
         if (elements > kMostNamed) what.push_back(fmt::format("{} more elements", elements - kMostNamed));
         if (!header_.textures.empty())
             what.push_back(
-                fmt::format("the texture {}, which a comment names: give the object a material with it",
+                fmt::format("the texture {}, which a comment mentions: give the object a material with it",
                             inQuotes(header_.textures.front())));
-        if (trailing_ > 0) what.push_back(fmt::format("{} bytes behind the last element", trailing_));
+        if (trailing_ > 0) what.push_back(fmt::format("{} bytes after the last element", trailing_));
         if (!what.empty()) logWarning("{}: left out: {}", path_, fmt::join(what, "; "));
     }
 
@@ -455,9 +455,9 @@ LoadedMesh loadPly(const std::string& path, const PlyOptions& options) {
     if (!beginsAsPly(content)) {
         const std::string format = otherFormat(content);
         failMesh(format.empty()
-                     ? "this is no PLY file, which begins with the line 'ply'; an OBJ is named by "
-                       "'obj:' in place of 'ply:'"
-                     : fmt::format("this is {}; 'ply:' names a PLY", format),
+                     ? "this is not a PLY file, because its first line is not 'ply'; for an OBJ use 'obj:' "
+                       "instead of 'ply:'"
+                     : fmt::format("this is {}; 'ply:' needs a PLY file", format),
                  path);
     }
     return readPly(std::move(content), path, options, stage, kRowsAtATime);

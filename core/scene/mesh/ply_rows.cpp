@@ -84,7 +84,7 @@ std::string_view PlyRows::nextLine(PlyBlocks::Place& place) const {
         ++place.line;
         if (!line.empty()) return line;
     }
-    throw BadPlyRow{"is not there: the file ends before it"};
+    throw BadPlyRow{"is missing: the file ends before it"};
 }
 
 void PlyRows::fail(const PlyElement& element, std::uint64_t number, const BadPlyRow& row, int line) const {

@@ -97,7 +97,7 @@ public:
         constexpr double kExact = 9e15;
         const double real = numberOf(text).value_or(0.5);
         if (!(std::abs(real) < kExact) || real != std::floor(real))
-            throw BadPlyRow{fmt::format("has {} where a whole number belongs", inQuotes(text))};
+            throw BadPlyRow{fmt::format("has {} where a whole number is expected", inQuotes(text))};
         return static_cast<std::int64_t>(real);
     }
     void requireValues(std::uint64_t count, PlyType) const {

@@ -174,13 +174,13 @@ struct Odd {
     void tell(const Texels& texels, const std::string& path) const {
         if (const std::size_t i = not_finite; i < texels.info.count())
             throw Error(ErrorKind::Scene,
-                        fmt::format("the image '{}' has a texel that is no number, at x = {}, y = {}", path,
+                        fmt::format("the image '{}' has a texel that is NaN, at x = {}, y = {}", path,
                                     i % texels.info.width, i / texels.info.width),
                         {path});
         if (outside > 0)
             logWarning(
-                "the image '{}' has {} numbers outside [0, 1], which a reflectance or roughness cannot be; "
-                "they were clamped",
+                "the image '{}' has {} values outside [0, 1], the range of reflectance and roughness; they "
+                "were clamped",
                 path, outside.load());
     }
 };
@@ -323,8 +323,8 @@ std::shared_ptr<const TextureImage> TextureFiles::make(const ImageSource& source
     if (use.kind == TexelKind::Spectra) (void)primariesToSrgb(info, path);  // refuses those it does not know
     if (use.kind == TexelKind::Normals && info.channels != 3)
         throw Error(ErrorKind::Scene,
-                    fmt::format("the image '{}' is grey: a normal map has the three components of its "
-                                "normals as red, green and blue",
+                    fmt::format("the image '{}' is grey: a normal map stores the components of normals as "
+                                "red, green and blue",
                                 path),
                     {path});
     auto image = std::make_shared<TextureImage>();

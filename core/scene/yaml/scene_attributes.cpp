@@ -90,7 +90,7 @@ void MeshReader::readAttributes(const SectionReader& section, Mesh& mesh) const 
         mesh.colors.push_back(color);
     }
     if (section.has("color_space") && !section.has("colors"))
-        section.error("color_space", "there are no 'colors' that it could be about");
+        section.error("color_space", "it needs 'colors'");
 }
 
 void MeshReader::checkTextures(const SectionReader& section, const Object& object) const {
@@ -108,14 +108,14 @@ void MeshReader::checkTextures(const SectionReader& section, const Object& objec
         const Needs needs = needsOf(scene_, material);
         if (needs.opacity && !mesh.uvs_are_opacity)
             section.error(named,
-                          fmt::format("material '{}' asks for the opacity of vertices, but the mesh of {} "
-                                      "has none",
+                          fmt::format("material '{}' needs the opacity of vertices, but the mesh of {} has "
+                                      "none",
                                       material.name, section.subject()),
                           section.has("gltf") ? "write 'vertex_opacity: true' in the gltf" : "");
         if (needs.uvs && mesh.uvs_are_opacity)
             section.error(named,
-                          fmt::format("material '{}' has a texture, but the mesh of {} has opacities in "
-                                      "place of texture coordinates",
+                          fmt::format("material '{}' has a texture, but the mesh of {} has opacities "
+                                      "instead of texture coordinates",
                                       material.name, section.subject()));
         if (needs.uvs && mesh.uvs.empty() && !object.shape)
             section.error(named,
@@ -125,12 +125,11 @@ void MeshReader::checkTextures(const SectionReader& section, const Object& objec
                           section.has("mesh") ? "give the mesh 'uvs', one [u, v] for each position" : "");
         if (needs.colors && mesh.colors.empty())
             section.error(named,
-                          fmt::format("material '{}' asks for colours of vertices, but the mesh of {} has "
-                                      "none",
+                          fmt::format("material '{}' needs colours of vertices, but the mesh of {} has none",
                                       material.name, section.subject()),
                           section.has("mesh") ? "give the mesh 'colors', one [r, g, b] for each position"
                           : section.has("obj")
-                              ? "crt reads them from a PLY, and of meshes that are written out"
+                              ? "crt reads them from a PLY or from 'colors' of a 'mesh'"
                               : "");
     }
 }
@@ -157,9 +156,9 @@ void MeshReader::addMaps(LoadedMesh& loaded, const std::string& path) {
     for (LoadedMaterial& material : loaded.materials) {
         if (!material.mtl) continue;
         MtlMaterial& mtl = *material.mtl;
-        add(mtl.map_kd, "map_Kd", {}, "the Kd beside it counts", mtl.material.reflectance_texture);
+        add(mtl.map_kd, "map_Kd", {}, "crt uses Kd instead", mtl.material.reflectance_texture);
         add(mtl.map_d, "map_d", {.kind = TexelKind::Numbers, .channel = mtl.map_d ? mtl.map_d->channel : 0},
-            "the d beside it counts", mtl.material.opacity_texture);
+            "crt uses d instead", mtl.material.opacity_texture);
         add(mtl.norm, "norm", {.kind = TexelKind::Normals}, "left out", mtl.material.normal_texture);
     }
     for (const auto& [keyword, count] : without_uvs)

@@ -24,8 +24,8 @@ void MaterialReader::readParts(const SectionReader& material) {
     if (list == nullptr) return;
     if (list->items.size() != 2) {
         material.error("materials",
-                       fmt::format("a mix is of two materials, not {}", list->items.size()),
-                       list->items.size() > 2 ? "mix two of them first, and the mix with the next" : "");
+                       fmt::format("a mix needs two materials, not {}", list->items.size()),
+                       list->items.size() > 2 ? "mix two of them first, then that mix with the next" : "");
         return;
     }
     for (std::size_t i = 0; i < 2; ++i) {
@@ -77,7 +77,7 @@ void MaterialReader::checkInsides(std::int32_t whole, const YamlPlace& place) co
         if (!(glass->eta == all[0]->eta) || !(absorption(*glass) == absorption(*all[0]))) {
             out_.error(place,
                        fmt::format("material '{}' is a mix of glass '{}' and glass '{}', whose 'ior' or "
-                                   "'absorption' differ: what is behind a surface has one of each",
+                                   "'absorption' differ: the inside of a surface can have only one of each",
                                    material.name, all[0]->name, glass->name),
                        "give both the same 'ior' and the same 'absorption'");
             return;
@@ -111,31 +111,31 @@ void MaterialReader::checkParts(const std::vector<std::int32_t>& way) {
             std::vector<std::string> names;
             for (auto step = further.begin() + (again - way.begin()); step != further.end(); ++step)
                 names.push_back("'" + at(*step).name + "'");
-            out_.error(place, fmt::format("material '{}' is made of itself: {}", at(part).name,
+            out_.error(place, fmt::format("material '{}' contains itself: {}", at(part).name,
                                           fmt::join(names, " of ")));
             return;
         }
         if (further.size() > static_cast<std::size_t>(kDeepestComposition) + 1) {
-            out_.error(place, fmt::format("material '{}' is made of others more than {} deep",
+            out_.error(place, fmt::format("material '{}' nests materials more than {} deep",
                                           at(way.front()).name, kDeepestComposition));
             return;
         }
         if (!at(part).isOpaque())
             out_.error(place,
-                       fmt::format("material '{}' has an opacity, which a part of another cannot have",
+                       fmt::format("material '{}' is part of another material and cannot set 'opacity'",
                                    at(part).name),
                        fmt::format("give the opacity to '{}'", at(way.front()).name));
         if (at(part).emission >= 0)
             out_.error(place,
-                       fmt::format("material '{}' emits light, which a part of another cannot do",
+                       fmt::format("material '{}' is part of another material and cannot emit light",
                                    at(part).name),
                        "leave its 'emission_luminance' out, and give the object 'emission'");
         const bool one_side = std::any_of(way.begin(), way.end(), [&](std::int32_t index) {
             return at(index).type == MaterialType::TwoSided;
         });
         if (one_side && transmits(at(part)))
-            out_.error(place, fmt::format("material '{}' lets light through: it has both sides itself, and "
-                                          "cannot be one of a two_sided material",
+            out_.error(place, fmt::format("material '{}' lets light through, so it cannot be a side of a "
+                                          "two_sided material",
                                           at(part).name));
         checkParts(further);
     }

@@ -199,37 +199,37 @@ outputs:
   a number needs quotes.
 - Anchors and aliases work. Merge keys (`<<`), tags (`!!float`), cycles and several documents in one file
   are refused.
-- Relative file names are looked up beside the scene, then in the directories of `CRT_MESH_PATH` (separated
-  by `:`), or, where that is not set, in the meshes installed with crt. Names of outputs are relative to the
-  working directory.
+- Relative file names are looked up in the scene's folder, then in the directories of `CRT_MESH_PATH`
+  (separated by `:`), or, if that is not set, in the meshes installed with crt. Names of outputs are relative
+  to the working directory.
 - All errors of a file are reported at once, each with its line, and crt ends with code 3. Spectra and
   materials that nothing uses are warnings.
 - `--set film.resolution=[128,128]` or `--set objects.0.material=red` changes a value before the scene is
-  checked. Lists go by index, from 0. A key that is set takes the place of those that exclude it:
-  `--set camera.fov=50` that of a `focal_length` with its `sensor`. `null` takes an optional key away:
+  checked. Lists go by index, from 0. A key that is set replaces the keys that exclude it:
+  `--set camera.fov=50` replaces a `focal_length` with its `sensor`. `null` removes an optional key:
   `--set objects.1.emission=null` switches a light off.
 - Editors that know JSON Schema check scenes while you type: save `crt schema` as `crt-scene-1.schema.json`
   and begin the scene with `# yaml-language-server: $schema=crt-scene-1.schema.json`.
 
 ## Shared parts
 
-`include` names scene files, one or a list, relative to the file that it stands in. Each of them begins with
-`crt: 1` and may leave out whatever a scene may leave out. They are read as if they stood where `include`
-does:
+`include` names scene files, one or a list, relative to the file that contains it. Each of them begins with
+`crt: 1` and may leave out everything that a scene may leave out. They are merged into the scene:
 
 - `camera`, `film`, `integrator`, `sampler`, `environment`, `spectra` and `materials` are merged key by key.
   Where two files give the same key, the including file wins over what it includes, and of a list of files
   the later one wins over the earlier. A value is replaced as a whole: a material is never made of two
-  halves. What excludes it gives way too: an included `focal_length` with its `sensor` to a `fov`.
-- `objects` and `lights` are joined: those of the included files come first, in the order of the list.
+  halves. A value also removes included keys that exclude it: a `fov` removes a `focal_length` with its
+  `sensor`.
+- `objects` and `lights` are concatenated: those of the included files come first, in the order of the list.
 - `title`, `unit` and `outputs` are those of the file that wins; two files with different units are an error.
-- `key: null` takes an included value away where `null` is a value of the key, such as `environment: null`.
+- `key: null` removes an included value if `null` is a valid value of the key, such as `environment: null`.
 - A file that several files include counts once. A file that includes itself, directly or through others, is
   an error. Files may be included 16 deep.
-- Relative names of meshes and spectra are looked up beside the file that names them.
-- `--set` changes the result, so it reaches what was included too.
-- Spectra and materials of included files that nothing uses are no warning.
-- An included file that gives a `unit` gives it to the whole scene, as everything that stands in it does.
+- Relative names of meshes and spectra are looked up in the folder of the file that names them.
+- `--set` changes the merged scene, including the values of included files.
+- Unused spectra and materials of included files cause no warning.
+- A `unit` in an included file holds for the whole scene.
 
 ```yaml
 crt: 1
@@ -244,20 +244,20 @@ objects:
 EXR and PFM files hold radiance in the colour space of the film: XYZ are ∫ L (x̄, ȳ, z̄) dλ / ∫
 ȳ dλ, with L in W·m⁻²·sr⁻¹·nm⁻¹, and RGB are linear in them. So a pixel with Y = 1, such as
 RGB (1, 1, 1), has the luminance 683.002 lm/W · 106.857 nm = 72,983 cd/m², and Y times that is the
-luminance of every pixel. In sRGB Y = 0.2126 R + 0.7152 G + 0.0722 B. EXR files say the number
-themselves, as OpenEXR's attribute `whiteLuminance` (`crt info a.exr` prints it), in each of the three
+luminance of every pixel. In sRGB Y = 0.2126 R + 0.7152 G + 0.0722 B. EXR files store this number
+as OpenEXR's attribute `whiteLuminance` (`crt info a.exr` prints it), in each of the three
 colour spaces; where `apply_to_float` multiplies the values by 2^ev, it is divided by that. Spectral bins
-are radiance as it is, in W·m⁻²·sr⁻¹·nm⁻¹. The illuminance of a matt surface of reflectance
+are radiance, in W·m⁻²·sr⁻¹·nm⁻¹. The illuminance of a matt surface of reflectance
 ρ is π / ρ times its luminance. PNG and PPM are for screens: exposed, balanced, sRGB-encoded and
-clipped, and hold none of this. The mean luminance in `report.json` is in both units.
+clipped, so they do not hold radiance. The mean luminance in `report.json` is in both units.
 
-`crt SCENE --expose auto` chooses `exposure_ev` by the picture, and prints it: the geometric mean of its
-luminance becomes 18 % grey.
+`crt SCENE --expose auto` chooses `exposure_ev` so that the geometric mean of the luminance becomes
+18 % grey, and prints it.
 
 ## Named data
 
-`{data: NAME}` is a measured spectrum that comes with crt, wherever a spectrum can stand. `crt data` lists
-them with their sources, `crt data NAME` prints one. The families are
+`{data: NAME}` is a measured spectrum that comes with crt, usable as any spectrum. `crt data` lists them
+with their sources, `crt data NAME` prints one. The families are
 
 - `cornell/…`: paints and lamp of the Cornell box;
 - `paints/…`: the 24 paints of the ColorChecker chart;
@@ -271,7 +271,7 @@ in a folder of `CRT_DATA_PATH`, whose folders, separated by `:`, are searched be
 /// What stands before the variants of a family.
 std::string_view familyIntroduction(std::string_view family) {
     if (family == "spectrum")
-        return "A function of wavelength, from 360 to 830 nm. Wherever a key wants a spectrum it takes\n\n"
+        return "A function of wavelength, from 360 to 830 nm. A key that needs a spectrum takes\n\n"
                "- a number: the same at every wavelength;\n"
                "- text: the name of an entry of `spectra` (for `white_balance` also of an illuminant);\n"
                "- a map of one of the forms below.\n";
@@ -279,15 +279,15 @@ std::string_view familyIntroduction(std::string_view family) {
         return "A value that depends on the place: where a key takes a texture, it takes a map of one of "
                "these forms, too. An alias (`&wood`, `*wood`) uses one several times; a file is read once "
                "however often it is named.\n";
-    if (family == "material") return "What light does at a surface. `type` picks one of these.\n";
+    if (family == "material") return "The scattering of light at a surface. `type` selects one of these.\n";
     if (family == "light")
-        return "A light without a surface: `lights` lists them, and `type` picks one of these. How bright "
-               "it is says one key, whose name gives the unit: a spectrum in absolute terms, or an amount "
-               "to which `spectrum` is scaled. A scene unit counts as a metre.\n\n"
+        return "A light without a surface: `lights` lists them, and `type` picks one of these. One key sets "
+               "the brightness, and its name gives the unit: a spectrum in absolute terms, or an amount to "
+               "which `spectrum` is scaled. A scene unit is a metre.\n\n"
                "All but suns have no size and are found by light sampling alone. They need "
                "`integrator.nee`, and they shine through panes. Their light is missing where it comes by "
                "way of smooth glass, mirrors, smooth metals and coats, or is mirrored by a pane: "
-               "crt warns of it, and no stated error contains it (`missing_light` in the report, "
+               "crt warns of this, and no stated error includes it (`missing_light` in the report, "
                "`crt/missingLight` in images). A small emitting sphere is found there. With "
                "`integrator.mis: false` they shine as ever.\n";
     if (family == "transform")
@@ -357,18 +357,18 @@ std::string mtlTable() {
     std::string text =
         "\nMaterials of an OBJ come from the files that its `mtllib` names: all of them are read, and the "
         "first definition of a name counts. `\\` in a name is read as `/`; letters of another case, folders "
-        "that are not there, and an MTL that was renamed together with its OBJ are forgiven, each with a "
-        "warning. A file that is missing costs its materials, not the mesh: `material` fills the faces. "
-        "A material is, by the first rule that fits,\n\n"
-        "1. glass (dielectric, smooth and clear), if `Ni` is above 1 and the material says that light "
-        "passes: `d` below 1, `Tr` above 0 without `d`, a `Tf` that is "
+        "that are not there, and an MTL that was renamed together with its OBJ are accepted, each with a "
+        "warning. If a file is missing, the mesh loses its materials, and `material` is used instead. A "
+        "material is, by the first rule that applies,\n\n"
+        "1. glass (dielectric, smooth and clear), if `Ni` is above 1 and the material lets light pass: `d` "
+        "below 1, `Tr` above 0 without `d`, a `Tf` that is "
         "neither black nor white, `illum` 6, 7 or 9, or `illum` 4 without a white `Tf`;\n"
         "2. a mirror, if `Pm` is 0.5 or more, or `illum` is 3 or 5 with Kd ≤ 0.1 and a Ks;\n"
         "3. diffuse.\n\n"
-        "crt says in one line a file what its materials became and what was left out. A statement whose "
-        "numbers cannot be read counts as left out. Keywords that "
-        "are not in this table are named in that line.\n\n"
-        "| MTL | Arguments | What crt makes of it |\n|---|---|---|\n";
+        "One line per file reports the resulting materials, the statements that were left out, and the "
+        "keywords "
+        "that are not in this table. A statement with invalid numbers counts as left out.\n\n"
+        "| MTL | Arguments | Meaning in crt |\n|---|---|---|\n";
     for (const MtlKey& key : mtlKeys()) {
         std::string words = fmt::format("`{}`", key.keyword);
         for (const std::string& alias : key.aliases) words += fmt::format(", `{}`", alias);

@@ -28,7 +28,7 @@ bool readUp(const SectionReader& section, Vec3d& up) {
     if (!section.read("up", up)) return true;
     const std::optional<Vec3d> unit = unitVector(up);
     if (!unit) {
-        section.error("up", "a direction of length 0 leads nowhere");
+        section.error("up", "a direction cannot have length 0");
         return false;
     }
     up = *unit;
@@ -78,7 +78,7 @@ bool readSky(const SectionReader& section, SpectrumReader& spectra, Environment&
     sky.horizontal = section.read("horizontal_illuminance_lx", amount);
     if (!sky.horizontal && !section.read("zenith_luminance_cd_m2", amount)) return false;
     if (!(unit > 0)) {
-        section.error("spectrum", "this spectrum has no light that the eye sees");
+        section.error("spectrum", "this spectrum has no visible light");
         return false;
     }
     sky.amount = amount / unit;

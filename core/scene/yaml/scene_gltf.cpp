@@ -35,7 +35,7 @@ std::optional<std::uint32_t> MeshReader::readGltf(const SectionReader& object) {
     const std::optional<SectionReader> form =
         object.section("gltf", fmt::format("the gltf of {}", object.subject()));
     refuseObjKeys(object);
-    if (object.has("vertex_colors")) object.error("vertex_colors", "this is about the colours in a PLY");
+    if (object.has("vertex_colors")) object.error("vertex_colors", "this key needs colours from a PLY");
     const NormalsUse normals = readNormals(object);
     std::string name;
     GltfPrimitive which;

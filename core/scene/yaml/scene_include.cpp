@@ -92,10 +92,10 @@ void checkUnits(const YamlNode& below, const YamlNode& above, Diagnostics& out) 
     const YamlEntry *lower = below.find("unit"), *upper = above.find("unit");
     if (lower == nullptr || upper == nullptr || lower->value->text == upper->value->text) return;
     out.error(upper->place,
-              fmt::format("the unit is '{}' here and '{}' in {}: files that are read as one scene count in "
-                          "one unit",
+              fmt::format("the unit is '{}' here and '{}' in {}: all files of a scene must use the same "
+                          "unit",
                           upper->value->text, lower->value->text, lower->place.resolved().text()),
-              "leave one of them out, and scale the lengths of its file");
+              "remove one of them, and scale the lengths of its file");
 }
 
 /// Two scenes as one. Sections, `spectra` and `materials` key by key, `objects` and `lights` joined;
@@ -165,7 +165,7 @@ YamlNodePtr SceneIncludes::readIncluded(const std::string& name, const YamlPlace
     if (!path) return nullptr;
     const std::string identity = identityOf(*path);
     if (std::find(open_.begin(), open_.end(), identity) != open_.end()) {
-        out_.error(place, fmt::format("'{}' is included by itself: a cycle has no end", *path));
+        out_.error(place, fmt::format("'{}' includes itself, directly or through other files", *path));
         return nullptr;
     }
     if (complete_.contains(identity)) return nullptr;

@@ -28,7 +28,7 @@ void readDirection(const SectionReader& section, PointLight& light) {
     if (const std::optional<Vec3d> unit = unitVector(way))
         light.direction = *unit;
     else
-        section.error(key, key == "direction" ? "a direction of length 0 leads nowhere"
+        section.error(key, key == "direction" ? "a direction cannot have length 0"
                                               : "the target is where the light is, or too far away");
 }
 
@@ -96,7 +96,7 @@ void readBeam(const SectionReader& section, PointLight& light) {
         section.read("radius", light.radius);
     }
     if (section.has("up") && light.radius > 0)
-        section.error("up", "a disk has no height; 'up' is of a slit, which has a 'size'");
+        section.error("up", "a disk has no height; 'up' needs a slit, which has a 'size'");
     light.across = cross(light.direction, readAcross(section, "up", {0, 1, 0}, light.direction));
 }
 
@@ -109,7 +109,7 @@ void readIesBrightness(const SectionReader& section, PointLight& light) {
     const double lumens = photometric(light.spectrum);
     if (!(lumens > 0))
         return section.error(section.has("spectrum") ? "spectrum" : "file",
-                             "this spectrum has no light that candelas measure");
+                             "this spectrum has no visible light, which candelas measure");
     double scale = 1, amount = 0;
     section.read("scale", scale);
     const double flux_lm = luminousFlux_lm(*light.ies);
@@ -187,8 +187,8 @@ void checkFound(const SectionReader& section, const PointLight& light,
         return;
     section.diagnostics().error(
         section.place(),
-        fmt::format("{} is found by light sampling alone, and 'integrator.nee' is false", section.subject()),
-        "set 'integrator.nee: true', or use a lamp with a surface");
+        fmt::format("only light sampling finds {}, and 'integrator.nee' is false", section.subject()),
+        "set 'integrator.nee: true', or use an emitting surface");
 }
 
 }  // namespace

@@ -18,7 +18,7 @@ void MaterialReader::readMaterial(const YamlEntry& entry) {
     names_.push_back(entry.key);
     if (entry.key == "from_mtl" || entry.key.empty() || looksLikeNumber(entry.key)) {
         out_.error(entry.key_place,
-                   fmt::format("'{}' cannot name a material: where it is used it would mean something else",
+                   fmt::format("'{}' cannot be the name of a material: the word has another meaning there",
                                entry.key));
         return;
     }
@@ -106,8 +106,7 @@ void MaterialReader::readMaterial(const YamlEntry& entry) {
     }
     if (material.absorption && !material.isOpaque())
         section->error("opacity",
-                       "a body that absorbs is closed: where its surface is not there, light would enter it "
-                       "unseen",
+                       "an absorbing body must be closed: light would enter it through holes",
                        "leave 'opacity' or 'absorption' out");
     if (section->schema().find("thin_film") != nullptr) readThinFilm(*section, material);
     if (section->schema().find("roughness_anisotropy") != nullptr) readAnisotropy(*section, material);
@@ -123,7 +122,7 @@ void MaterialReader::makeRoughDiffuse(Material& material) {
 void MaterialReader::readThinFilm(const SectionReader& section, Material& material) {
     if (!section.has("thin_film")) return;
     const std::optional<SectionReader> film =
-        section.section("thin_film", fmt::format("the film of material '{}'", material.name));
+        section.section("thin_film", fmt::format("the thin film of material '{}'", material.name));
     if (!film) return;
     film->read("thickness_nm", material.film_thickness_nm);
     if (std::optional<Spectrum> index = spectra_.read(*film, "ior", SpectrumUse::Index))
@@ -134,9 +133,9 @@ void MaterialReader::readThinFilm(const SectionReader& section, Material& materi
         material.film_thickness_nm *= relative;
     } else if (material.type == MaterialType::RoughDielectric) {
         film->error("relative_thickness",
-                    "a film on a rough_dielectric is equally thick everywhere: what its microfacets lose is "
-                    "tabulated for one thickness",
-                    "leave 'relative_thickness' out, give a number, or take a dielectric");
+                    "a thin film on a rough_dielectric needs a uniform thickness, because the energy loss "
+                    "of its microfacets is tabulated for one thickness",
+                    "remove 'relative_thickness', give a number, or use a dielectric");
     } else {
         material.film_texture =
             textures_.read(*film, "relative_thickness", TexelKind::Numbers).value_or(kNoTexture);
@@ -149,13 +148,13 @@ void MaterialReader::readAnisotropy(const SectionReader& section, Material& mate
     if (!(material.anisotropy > 0)) return;
     if (material.roughness_texture != kNoTexture)
         section.error("roughness_anisotropy",
-                      "an anisotropic surface is equally rough everywhere: what its microfacets lose is "
-                      "tabulated for one roughness",
+                      "an anisotropic surface needs a uniform roughness, because the energy loss of its "
+                      "microfacets is tabulated",
                       "give 'roughness' a number, or leave 'roughness_anisotropy' out");
     if (material.type == MaterialType::RoughDielectric && material.film_thickness_nm > 0)
         section.error("roughness_anisotropy",
-                      "a rough_dielectric under a film is as rough in every direction: what its microfacets "
-                      "lose is tabulated by wavelength already",
+                      "a rough_dielectric under a thin film must be isotropic, because the energy loss of "
+                      "its microfacets is tabulated by wavelength",
                       "leave 'thin_film' or 'roughness_anisotropy' out");
 }
 

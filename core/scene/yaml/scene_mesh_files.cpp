@@ -26,7 +26,7 @@ MeshReader::MeshUse MeshReader::readMeshUse(const SectionReader& object, const s
         use.material = material;
         return use;
     }
-    if (object.has("vertex_colors")) object.error("vertex_colors", "this is about the colours in a PLY");
+    if (object.has("vertex_colors")) object.error("vertex_colors", "this key needs colours from a PLY");
     use.parts = readMeshParts(object);
     if (material != "from_mtl") use.material = material;
     if (const std::optional<SectionReader> mtl =
@@ -38,8 +38,8 @@ MeshReader::MeshUse MeshReader::readMeshUse(const SectionReader& object, const s
     use.file.obj.use_mtl = false;
     if (use.material.empty())
         object.error("override",
-                     "there is nothing to put in place of the materials "
-                     "of the OBJ; name a material with 'material:'");
+                     "'override' needs a replacement for the materials of the OBJ; name one with "
+                     "'material:'");
     return use;
 }
 
@@ -54,8 +54,8 @@ void MeshReader::refuseObjKeys(const SectionReader& object) const {
 void MeshReader::refuseMeshKeys(const SectionReader& object) const {
     refuseObjKeys(object);
     for (const char* key : {"normals", "crease_angle_deg"})
-        if (object.has(key)) object.error(key, "a shape has normals of its own");
-    if (object.has("vertex_colors")) object.error("vertex_colors", "this is about the colours in a PLY");
+        if (object.has(key)) object.error(key, "a shape already has normals");
+    if (object.has("vertex_colors")) object.error("vertex_colors", "this key needs colours from a PLY");
 }
 
 MeshReader::NormalsUse MeshReader::readNormals(const SectionReader& object) const {
@@ -64,8 +64,8 @@ MeshReader::NormalsUse MeshReader::readNormals(const SectionReader& object) cons
     object.read("crease_angle_deg", use.crease_angle_deg);
     if (use.source == NormalsUse::Source::Smooth) return use;
     if (object.has("crease_angle_deg"))
-        object.error("crease_angle_deg", "only normals that crt works out have creases",
-                     "write 'normals: smooth' beside it");
+        object.error("crease_angle_deg", "only computed normals have creases",
+                     "add 'normals: smooth'");
     return {.source = use.source};
 }
 
@@ -74,7 +74,7 @@ void MeshReader::setNormals(Mesh& mesh, const NormalsUse& use, const std::string
     mesh.normals = {};
     mesh.normal_index = {};
     if (use.source == NormalsUse::Source::Flat) return;
-    const Stage stage(fmt::format("working out the normals of {}", subject));
+    const Stage stage(fmt::format("computing the normals of {}", subject));
     makeSmoothNormals(mesh, use.crease_angle_deg);
 }
 
@@ -197,8 +197,8 @@ void MeshReader::checkMaterials(const SectionReader& object, const LoadedMesh& l
     if (!use.material.empty()) {
         if (bare > 0) return;
         logInfo(
-            "{}: {} has no face for material '{}': the OBJ gives each its own; 'override: true' replaces "
-            "them all",
+            "{}: {} has no face without a material, so '{}' is unused; 'override: true' replaces all "
+            "materials of the OBJ",
             object.place("material").resolved().text(), object.subject(), use.material);
         return;
     }
@@ -207,7 +207,8 @@ void MeshReader::checkMaterials(const SectionReader& object, const LoadedMesh& l
     const std::string reason =
         loaded.missing_files.empty()
             ? ""
-            : fmt::format(" (the OBJ names {}, which is not there)", inQuotes(loaded.missing_files.front()));
+            : fmt::format(" (the OBJ refers to {}, which does not exist)",
+                          inQuotes(loaded.missing_files.front()));
     object.error(
         object.has("material") ? "material" : "obj",
         fmt::format("{} of {} triangles of {} have no material{}; give them one with 'material: NAME'", bare,

@@ -57,8 +57,8 @@ std::optional<std::uint32_t> MeshReader::read(const SectionReader& section,
     if (fresh) known->second = readWritten(*written, normals);
     refuseObjKeys(section);
     if (section.has("vertex_colors"))
-        section.error("vertex_colors", "this is about the colours in a PLY",
-                      "a mesh that is written out has 'color_space'");
+        section.error("vertex_colors", "this key needs colours from a PLY",
+                      "a 'mesh' has its own 'color_space'");
     return known->second;
 }
 
@@ -104,7 +104,7 @@ std::optional<std::uint32_t> MeshReader::readWritten(const SectionReader& sectio
                 polygon.push_back(static_cast<std::uint32_t>(index));
             else
                 out_.error(item->place,
-                           fmt::format("face {} names position {}, but there are only {} (counted from 0)",
+                           fmt::format("face {} uses position {}, but there are only {} (counted from 0)",
                                        f, index, mesh.positions.size()));
         }
         if (polygon.size() != face.items.size()) continue;

@@ -110,14 +110,14 @@ std::optional<Matrix4d> ObjectReader::readPlacement(const YamlNode& list, const 
             if (m[12] != 0 || m[13] != 0 || m[14] != 0 || m[15] != 1)
                 step->error("matrix", "the last row must be 0 0 0 1: points stay points");
             else if (std::abs(relativeVolume(m)) < kFlat)
-                step->error("matrix", "this matrix cannot be inverted: it flattens the object");
+                step->error("matrix", "this matrix is not invertible: it flattens the object");
         }
         good &= out_.count() == before;
         total = multiply(m, total);
     }
     if (good && !allFinite(total)) {
         out_.error(place,
-                   fmt::format("{} overflows: its steps multiply to numbers beyond a double", subject));
+                   fmt::format("{} overflows: the product of its steps is too large for a double", subject));
         good = false;
     }
     if (!good) return std::nullopt;
@@ -134,7 +134,7 @@ std::vector<Matrix4d> ObjectReader::readPlacements(const SectionReader& object) 
     if (list == nullptr) return {kIdentity4d};
     if (list->items.empty())
         object.error("transforms",
-                     "an object with no placement is nowhere; leave 'transforms' out for one as it is");
+                     "an object without placements is invisible; leave 'transforms' out for a single one");
     room_.placements += list->items.size();
     room_.require(object.place("transforms"), out_);
     std::vector<Matrix4d> placements;
@@ -188,7 +188,7 @@ void ObjectReader::readObject(const YamlNode& node, const YamlPlace& place, std:
     if (!section.has("obj")) {
         if (!section.has("material"))
             out_.error(place, fmt::format("'material' is missing in {}", section.subject()));
-        if (material_given && !named) section.error("material", "only an OBJ has materials of its own");
+        if (material_given && !named) section.error("material", "only an OBJ has its own materials");
     }
     const std::optional<std::uint32_t> mesh = meshes_.read(section, material_name, object);
     object.emission = materials_.readEmission(section, object.material, material_name).value_or(-1);

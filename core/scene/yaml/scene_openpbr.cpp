@@ -154,18 +154,18 @@ template <class No>
 void MaterialReader::OpenPbr::refuseCoat(const No& no) const {
     const bool has = coat.mayBeAbove0();
     no(has && isClear(), "coat_weight",
-       "light would be bent by the coat and by what lies below, and crt's coats lie on what is opaque",
+       "crt supports coats on opaque materials only",
        "leave 'coat_weight' or 'transmission_weight' out");
-    no(has && (coat_ior < 1 || coat_ior > 10), "coat_ior", "a coat has an index of 1 to 10",
+    no(has && (coat_ior < 1 || coat_ior > 10), "coat_ior", "the index of a coat must be 1 to 10",
        "give 'coat_ior' from 1 to 10");
     no(has && coat_roughness > 0 && coat_anisotropy > 0, "coat_roughness_anisotropy",
-       "a coat is as rough in every direction: what it reflects is tabulated",
+       "a coat must be isotropic, because its reflection is tabulated",
        "leave 'coat_roughness_anisotropy' out");
     no(has && coat_roughness > 0 && isMetal() && roughness.isTextured(), "specular_roughness",
-       "under a rough coat the metal is rougher, which is worked out for one roughness",
+       "a metal under a rough coat needs a uniform roughness",
        "give 'specular_roughness' a number, or 'coat_roughness' 0");
     no(has && emission_luminance > 0, "emission_luminance",
-       "the coat would take some of the light, and crt's lamps lie on top",
+       "the coat would absorb some of the emitted light, and crt supports emission only from the top layer",
        "leave 'coat_weight' or 'emission_luminance' out");
 }
 
@@ -176,61 +176,61 @@ void MaterialReader::OpenPbr::refuse() const {
     };
     double subsurface = 0;
     if (section.read("subsurface_weight", subsurface))
-        no(subsurface > 0, "subsurface_weight", "crt has no light that wanders below a surface",
-           "leave 'subsurface_weight' out: the base is diffuse then");
+        no(subsurface > 0, "subsurface_weight", "crt does not support subsurface scattering",
+           "remove 'subsurface_weight', which makes the base diffuse");
     no(emission_luminance > 0 && like.fuzz > 0, "emission_luminance",
-       "the fuzz would take some of the light, and crt's lamps lie on top",
+       "the fuzz would absorb some of the emitted light, and crt supports emission only from the top layer",
        "leave 'fuzz_weight' or 'emission_luminance' out");
     refuseCoat(no);
     bool thin_walled = false;
     if (section.read("geometry_thin_walled", thin_walled))
-        no(thin_walled, "geometry_thin_walled", "crt has no thin walls of openpbr materials",
-           "take a thin_dielectric");
+        no(thin_walled, "geometry_thin_walled", "crt does not support thin-walled openpbr materials",
+           "use a thin_dielectric");
     const auto indices = [&](auto&& are) {
         return (coat.mayBeBelow1() && are(index())) || (coat.mayBeAbove0() && are(index(true)));
     };
     const bool coated = isOpaque() && indices([](double n) { return n != 1; });
     no(base_texture != kNoTexture && base_weight != 1, "base_weight",
-       "a texture is the colour itself: crt has no factor on it", "leave 'base_weight' out");
+       "crt does not multiply a texture by 'base_weight'", "leave 'base_weight' out");
     no(isMetal() && specular_weight > 1, "specular_weight",
-       "a metal would reflect more light than there is", "give 'specular_weight' 1 or less");
+       "a metal would reflect more light than it receives", "give 'specular_weight' 1 or less");
     no((coated || isClear()) && !isWhite(specular_color), "specular_color",
-       "no dielectric tints what it reflects alone; crt has the colour for metals",
+       "crt supports 'specular_color' for metals only",
        "leave 'specular_color' out, or give 'base_metalness' 1");
     no(coated && like.anisotropy > 0, "specular_roughness_anisotropy",
-       "the gloss on an opaque base is as rough in every direction: what it reflects is tabulated",
+       "the gloss on an opaque base must be isotropic, because its reflection is tabulated",
        "leave it out, or give 'base_metalness' or 'transmission_weight' 1");
     no(coated && roughness.isTextured(), "specular_roughness",
-       "the gloss on an opaque base is equally rough everywhere: what it reflects is tabulated",
+       "the gloss on an opaque base needs a uniform roughness, because its reflection is tabulated",
        "give a number, or 'base_metalness' or 'transmission_weight' 1");
     no(coated && indices([](double n) { return n < 1 || n > 10; }), "specular_ior",
-       "the gloss on an opaque base has an index of 1 to 10, after 'specular_weight' has changed it",
-       "give 'specular_ior' from 1 on, and a smaller 'specular_weight'");
+       "the index of the gloss on an opaque base must be 1 to 10, including the effect of 'specular_weight'",
+       "give 'specular_ior' of at least 1, and a smaller 'specular_weight'");
     no(isClear() && !(index() <= 1e3 && index() >= 1e-3), "specular_weight",
        "this changes the index to beyond 0.001 to 1000", "give a smaller 'specular_weight'");
     no(isClear() && !isWhite(transmission_color) && transmission_depth == 0, "transmission_color",
-       "a depth of 0 would tint the surface itself, not what is below it",
-       "give 'transmission_depth', where light has this colour");
+       "a depth of 0 would tint the surface itself instead of the inside",
+       "give 'transmission_depth', the distance after which light has this colour");
     no(isClear() && transmission_depth > 0 && !(transmission_color.min() > 0), "transmission_color",
-       "what is black at any depth is opaque, not clear", "give a colour above 0 at every wavelength");
+       "black is opaque at any depth", "give a colour above 0 at every wavelength");
     no(isClear() && dispersion_scale > 0 && !(dispersed(index(), abbe / dispersion_scale).min() > 1e-3),
        "transmission_dispersion_abbe_number", "the index would fall below 0.001",
        "give a larger Abbe number");
     const bool film = film_weight > 0 && film_um > 0;
     no((isMetal() || isClear()) && like.anisotropy > 0 && roughness.isTextured(),
        "specular_roughness_anisotropy",
-       "an anisotropic surface is equally rough everywhere: what its microfacets lose is tabulated for one "
-       "roughness",
+       "an anisotropic surface needs a uniform roughness, because the energy loss of its microfacets is "
+       "tabulated",
        "give 'specular_roughness' a number, or leave 'specular_roughness_anisotropy' out");
     no(isClear() && film && like.anisotropy > 0, "specular_roughness_anisotropy",
-       "a clear dielectric under a film is as rough in every direction",
+       "a clear dielectric under a thin film must be isotropic",
        "leave 'thin_film_weight' or 'specular_roughness_anisotropy' out");
     no(film && (isMetal() || coated), "thin_film_weight",
-       "crt has films on clear dielectrics, and on metals by their index, which a colour has not",
-       "give 'transmission_weight' 1, or take a rough_conductor with 'thin_film'");
+       "crt supports thin films on clear dielectrics, and on metals with a complex index",
+       "give 'transmission_weight' 1, or use a rough_conductor with 'thin_film'");
     const bool absorbs = isClear() && transmission_depth > 0 && !isWhite(transmission_color);
     no(absorbs && !like.isOpaque(), "geometry_opacity",
-       "a body that absorbs is closed: where its surface is not there, light would enter it unseen",
+       "an absorbing body must be closed: light would enter it through holes",
        "leave 'geometry_opacity' or 'transmission_color' out");
 }
 

@@ -44,7 +44,7 @@ private:
     void apply(YamlNodePtr& slot, const YamlNodePtr& value, std::size_t at, Row row) {
         if (++parts_ > kDeepestPath) {
             out_.error(place(0, path_.size()),
-                       fmt::format("a path of more than {} parts leads nowhere in a scene", kDeepestPath));
+                       fmt::format("a path of more than {} parts cannot exist in a scene", kDeepestPath));
             return;
         }
         slot = std::make_shared<YamlNode>(*slot);
@@ -57,7 +57,7 @@ private:
         }
         const std::string_view before = std::string_view(path_).substr(0, at > 0 ? at - 1 : 0);
         out_.error(place(at, path_.size() - at),
-                   fmt::format("'{}' is {} here, so there is nothing inside it to set", before,
+                   fmt::format("'{}' is {} here and has no keys", before,
                                describeNode(*slot)),
                    fmt::format("set '{}' as a whole", before));
     }
@@ -171,7 +171,7 @@ void applyOverrides(YamlNodePtr& root, const std::vector<SceneOverride>& overrid
         const std::size_t before = out.count();
         if (change.path == "include" || change.path.starts_with("include.")) {
             out.error({&source, 1, 1, static_cast<int>(change.path.size())},
-                      "'include' cannot be set: --set changes what the files say together");
+                      "--set cannot change 'include': it applies to the combined scene");
             continue;
         }
         const YamlNodePtr value =
@@ -180,7 +180,7 @@ void applyOverrides(YamlNodePtr& root, const std::vector<SceneOverride>& overrid
             OverrideWalk(change, source, out).apply(root, value);
         else if (out.count() == before)
             out.error({&source, 1, static_cast<int>(change.path.size()) + 1, 1},
-                      "there is no value after '='; null says none");
+                      "the value after '=' is missing; use null for none");
     }
 }
 

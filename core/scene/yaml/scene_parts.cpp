@@ -29,7 +29,7 @@ std::vector<PartUse> MeshReader::readMeshParts(const SectionReader& object) {
         part.emission = materials_.readEmission(section, part.material, material).value_or(-1);
         if (!section.has("material") && !section.has("emission"))
             out_.error(entry.place,
-                       fmt::format("{} says nothing: give it a 'material' or an 'emission'", subject));
+                       fmt::format("{} has no effect: give it a 'material' or an 'emission'", subject));
         parts.push_back(std::move(part));
     }
     return parts;

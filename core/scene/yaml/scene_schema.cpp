@@ -38,8 +38,8 @@ KeySchema outsideKey() {
     return {.name = "outside",
             .kind = Kind::Choice,
             .choices = {"clamp", "zero", "error"},
-            .doc = "Beyond the first and last wavelength: the end value, zero, or an error. Must be said "
-                   "unless the data cover 360 to 830 nm. With `zero` the table keeps its integral: where "
+            .doc = "Beyond the first and last wavelength: the end value, zero, or an error. Required unless "
+                   "the data cover 360 to 830 nm. With `zero` the table keeps its integral: where "
                    "its end is not 0, the step is spread over the nanometres that it touches, and one "
                    "wavelength alone is refused, because it has no width."};
 }
@@ -69,17 +69,17 @@ SectionSchema topLevel() {
                 {.name = "include",
                  .shape = Shape::OneOrList,
                  .count_min = 1,
-                 .doc = "Scene files whose contents count as if they stood here; see [Shared "
+                 .doc = "Scene files whose contents are added here; see [Shared "
                         "parts](#shared-parts)."},
                 {.name = "title",
-                 .doc = "What the scene shows. crt writes it into image metadata and the "
+                 .doc = "The title of the scene. crt writes it into image metadata and the "
                         "report."},
                 {.name = "unit",
                  .kind = Kind::Choice,
                  .choices = lengthUnitNames(),
                  .fallback = "m",
-                 .doc = "What one scene unit is: of the camera, of meshes and the files that they are in, "
-                        "of transforms, and of `absorption`. These numbers stay as they are written. "
+                 .doc = "The length of one scene unit, which holds for the camera, meshes and their files, "
+                        "transforms, and `absorption`. These numbers stay as they are written. "
                         "The unit matters to lights without a surface, whose watts, lumens and candelas "
                         "spread over square metres: with `mm`, a light at distance 2000 is 2 m away. "
                         "Radiance, irradiance, luminance and illuminance do not depend on it. An included "
@@ -93,7 +93,7 @@ SectionSchema topLevel() {
                 {.name = "integrator",
                  .kind = Kind::Section,
                  .section = "integrator",
-                 .doc = "How light is computed."},
+                 .doc = "The algorithm that computes light."},
                 {.name = "sampler",
                  .kind = Kind::Section,
                  .section = "sampler",
@@ -240,7 +240,7 @@ SectionSchema film() {
                  .kind = Kind::Choice,
                  .choices = spaces,
                  .fallback = yaml(spaces, d.color_space),
-                 .doc = "What the three channels mean: linear sRGB (Rec. 709), ACEScg (AP1), or CIE XYZ."},
+                 .doc = "Meaning of the three channels: linear sRGB (Rec. 709), ACEScg (AP1), or CIE XYZ."},
                 {.name = "white_balance",
                  .kind = Kind::Spectrum,
                  .fallback = "null",
@@ -265,14 +265,15 @@ SectionSchema film() {
                  .section = "spectral_film",
                  .fallback = "null",
                  .nullable = true,
-                 .doc = "Bins of wavelengths, which EXR files have beside the image."},
+                 .doc = "Bins of wavelengths, which EXR files have in addition to the image."},
                 {.name = "responses",
                  .kind = Kind::Spectrum,
                  .shape = Shape::Map,
                  .range = kRadiance,
                  .doc = fmt::format(
                      "The channels of a camera or an instrument: what its sensor answers to each "
-                     "wavelength. EXR files have `Response.NAME` beside the image: ∫ L r dλ / ∫ r dλ, "
+                     "wavelength. EXR files have `Response.NAME` in addition to the image: ∫ L r dλ / "
+                     "∫ r dλ, "
                      "so that radiance 1 at all wavelengths gives 1, as it does for Y. Up to {}; names are "
                      "letters, digits, `_` and `-`.",
                      kMostSensorResponses)},
@@ -288,22 +289,23 @@ SectionSchema spectralFilm() {
     return {"spectral_film",
             "a spectral film",
             "The spectrum of each pixel, in equal bins: mean radiance in W·m⁻²·sr⁻¹·nm⁻¹. "
-            "EXR files have a channel a bin, named by its middle as Fichet et al. (2021) and pbrt-v4 do "
-            "(`S0.550,000000nm`), beside the image and its error. Exposure, white balance and colour space "
-            "do not change them. A bin takes 16 bytes of memory a pixel.",
+            "EXR files have a channel per bin, named by its middle as Fichet et al. (2021) and pbrt-v4 do "
+            "(`S0.550,000000nm`), in addition to the image and its error. Exposure, white balance and "
+            "colour space "
+            "do not change them. A bin takes 16 bytes of memory per pixel.",
             {
                 {.name = "from_nm",
                  .kind = Kind::Number,
                  .range = wavelength,
                  .unit = "nm",
                  .required = true,
-                 .doc = "Where the first bin begins."},
+                 .doc = "Start of the first bin."},
                 {.name = "to_nm",
                  .kind = Kind::Number,
                  .range = wavelength,
                  .unit = "nm",
                  .required = true,
-                 .doc = "Where the last one ends."},
+                 .doc = "End of the last bin."},
                 {.name = "bins",
                  .kind = Kind::Integer,
                  .range = {1, kMostSpectralBins, false, false},
@@ -384,7 +386,7 @@ SectionSchema integrator() {
                  .kind = Kind::Choice,
                  .choices = accelerators,
                  .fallback = yaml(accelerators, d.accelerator),
-                 .doc = "How rays find surfaces: `auto` chooses by scene size between a BVH, a box per "
+                 .doc = "The acceleration structure: `auto` chooses by scene size between a BVH, a box per "
                         "object, and a plain loop."},
             }};
 }
@@ -405,19 +407,19 @@ SectionSchema sampler() {
                  .kind = Kind::Integer,
                  .range = kNotNegative,
                  .fallback = yaml(d.seed),
-                 .doc = "Another seed gives another, equally good, noise pattern."},
+                 .doc = "A different seed gives statistically equivalent noise."},
                 {.name = "samples",
                  .kind = Kind::Integer,
                  .range = {1, 9007199254740992.0, false, false},
                  .unit = "per pixel",
                  .fallback = yaml(d.samples),
-                 .doc = "Used when neither --spp nor --time says otherwise."},
+                 .doc = "Used unless --spp or --time is given."},
                 {.name = "replicates",
                  .kind = Kind::Integer,
                  .range = {1, 16, false, false},
-                 .doc = "Samples take turns between 2, 4, 8 or 16 independent sequences, from whose spread "
-                        "the image knows its own error. More make the "
-                        "error of a single pixel better known and, with sobol, the image noisier. 1: one "
+                 .doc = "Samples take turns between 2, 4, 8 or 16 independent sequences, whose spread gives "
+                        "the error of the image. More sequences make the error of a single pixel more "
+                        "certain and, with sobol, the image noisier. 1: one "
                         "sequence, whose error is only bounded. "
                         "By default 2 for films of 1000 pixels and more, up to 16 for smaller ones."},
             }};
@@ -456,8 +458,8 @@ void addSpectra(std::vector<SectionSchema>& all) {
                    "",
                    {{.name = "file",
                      .required = true,
-                     .doc = "A .spd or .csv of two columns, wavelength in nm and value; looked up beside "
-                            "the scene, then in "
+                     .doc = "A .spd or .csv of two columns, wavelength in nm and value; looked up in the "
+                            "scene's folder, then in "
                             "CRT_MESH_PATH."},
                     outsideKey(),
                     scaleKey()}});
@@ -601,7 +603,8 @@ void addDielectrics(std::vector<SectionSchema>& all) {
         .doc =
             "Absorption coefficient of the inside, by the Beer–Lambert law: over a distance d the "
             "share exp(−absorption · d) is left. The mesh must be closed. Of nested bodies the "
-            "innermost absorbs, even if it is clear; behind it the outer one absorbs again. Where "
+            "innermost absorbs, even if it is clear; behind it the outer one absorbs again. Device and "
+            "output "
             "bodies overlap, the one that light entered last absorbs. Cameras (the middle of their "
             "lens) and lights may be inside bodies. Bodies may touch. Overlap them a little where "
             "other surfaces are inside two bodies that share a face, or where the faces that touch are "
@@ -618,25 +621,26 @@ void addDielectrics(std::vector<SectionSchema>& all) {
         {"material/rough_dielectric",
          "a rough_dielectric material",
          "Frosted glass: microfacets as in `rough_conductor`, each of which reflects and "
-         "refracts. Clear glass is invisible under uniform light, at any roughness. How light "
-         "that meets several microfacets divides between reflection and transmission is an "
-         "approximation that loses no energy: from inside, the roughest glass reflects more straight on, "
-         "and less at grazing angles, than a random walk on Smith's surface. Where the glass would "
+         "refracts. Clear glass is invisible under uniform light, at any roughness. The division of light "
+         "that meets several microfacets into reflection and transmission is an approximation that loses no "
+         "energy: from inside, the roughest glass reflects more straight on, "
+         "and less at grazing angles, than a random walk on Smith's surface. Where the glass "
+         "would "
          "blur what is seen through it by less than 10⁻⁴ radians (α·|ior − 1|), crt treats it "
          "as smooth.",
          {materialType("rough_dielectric"), ior, textured(roughnessKey("smooth")), absorption,
           thinFilmKey()}});
     all.push_back({"material/thin_dielectric",
                    "a thin_dielectric material",
-                   "A window pane made of one sheet of faces: two parallel surfaces, between which light "
-                   "is reflected to and fro, each polarisation by itself. What passes is not bent: lights "
-                   "of every kind shine through any number of panes (4096 at most), and to pass one is no "
-                   "scattering event. A normal map turns what is mirrored. AOVs of first hits are of what "
-                   "a ray is stopped by: mostly of what is seen through the pane, and of the pane in the "
-                   "share that it mirrors. A film is on one of the two surfaces.",
+                   "A window pane made of one sheet of faces: two parallel surfaces, between which light is "
+                   "reflected back and forth, each polarisation by itself. Transmitted light is not bent: "
+                   "lights "
+                   "of every kind shine through any number of panes (4096 at most), and a passage is not a "
+                   "scattering event. A normal map affects the mirrored light only. AOVs of first hits "
+                   "describe the surface that stops a ray: mostly the one behind the pane, and the pane "
+                   "itself in the share that it mirrors. A film is on one of the two surfaces.",
                    {materialType("thin_dielectric"),
-                    index("Refractive index of the pane relative to what is "
-                          "around it."),
+                    index("Refractive index of the pane relative to its surroundings."),
                     thinFilmKey()}});
 }
 
@@ -731,7 +735,7 @@ void addShapes(std::vector<SectionSchema>& all) {
     const KeySchema inward{.name = "inward",
                            .kind = Kind::Boolean,
                            .fallback = "false",
-                           .doc = "Normals point to the inside, and what is outside is the body: the hollow "
+                           .doc = "Normals point to the inside, and the body is on the outside: the hollow "
                                   "side of a lens."};
     const auto size = [](int count, const char* doc) {
         return KeySchema{.name = "size",
@@ -749,8 +753,8 @@ void addShapes(std::vector<SectionSchema>& all) {
                    "A sphere around the origin, as it is: no triangles. A transform may turn, move and "
                    "scale it, but not stretch it; nor disks and cylinders. Of textures u goes once around "
                    "the axis z, from x, and v from the lower pole to the upper.",
-                   {radius, end("from_z", "What is below is left out. By default nothing is.", false),
-                    end("to_z", "What is above is left out.", false), inward}});
+                   {radius, end("from_z", "The part below is left out; by default nothing is.", false),
+                    end("to_z", "The part above is left out.", false), inward}});
     all.push_back({"disk",
                    "a disk",
                    "A disk around the origin, seen from z: that is its normal. Textures cover the square "
@@ -760,7 +764,8 @@ void addShapes(std::vector<SectionSchema>& all) {
                    "a cylinder",
                    "A cylinder around the axis z, without ends. Of textures u goes once around it, from x, "
                    "and v from end to end.",
-                   {radius, end("from_z", "Where it begins.", true), end("to_z", "Where it ends.", true),
+                   {radius, end("from_z", "Start.",
+                                          true), end("to_z", "End.", true),
                     inward}});
     all.push_back({"rectangle",
                    "a rectangle",
@@ -780,7 +785,8 @@ void addObjects(std::vector<SectionSchema>& all) {
                    {
                        {.name = "name", .doc = "For messages and reports."},
                        {.name = "obj",
-                        .doc = "A Wavefront OBJ file, looked up beside the scene, then in CRT_MESH_PATH."},
+                        .doc = "A Wavefront OBJ file, looked up in the scene's folder, then in "
+                               "CRT_MESH_PATH."},
                        {.name = "gltf",
                         .kind = Kind::Section,
                         .section = "gltf",
@@ -820,27 +826,27 @@ void addObjects(std::vector<SectionSchema>& all) {
                         .kind = Kind::Section,
                         .shape = Shape::Map,
                         .section = "part",
-                        .doc = "What parts of the OBJ are made of, by the names that it gives to faces: of "
-                               "groups (`g`), objects (`o`) and materials (`usemtl`, also of those that no "
-                               "MTL defines). In a name `*` stands for any letters and `?` for one. A face "
-                               "that several parts name gets its material of the last of them that has one, "
-                               "and its emission likewise: write the general part before the special one. A "
-                               "name that no face has is an error."},
+                        .doc = "Materials and emission for parts of the OBJ, by the names that it gives to "
+                               "faces: groups (`g`), objects (`o`) and materials (`usemtl`, also those that "
+                               "no MTL defines). In a name `*` stands for any letters and `?` for one. If "
+                               "several parts match a face, its material comes from the last of them that "
+                               "has one, and so does its emission: write the general part before the "
+                               "special one. A name that matches no face is an error."},
                        {.name = "mtl",
                         .kind = Kind::Section,
                         .section = "mtl",
-                        .doc = "How the MTL of the OBJ is read."},
+                        .doc = "Options for reading the MTL of the OBJ."},
                        {.name = "vertex_colors",
                         .kind = Kind::Choice,
                         .choices = {"srgb", "linear"},
-                        .doc = "What the colours in the PLY are, for `{attribute: colors}`. Left out: "
-                               "integers are sRGB-encoded, floats linear."},
+                        .doc = "Encoding of the colours in the PLY, for `{attribute: colors}`. By default "
+                               "integers are sRGB-encoded and floats linear."},
                        {.name = "normals",
                         .kind = Kind::Choice,
                         .choices = {"file", "smooth", "flat"},
                         .fallback = "file",
-                        .doc = "For shading. `file`: those of the file or mesh; faces that have none are "
-                               "flat. `smooth`: worked out, at each vertex the mean of the faces around it, "
+                        .doc = "For shading. `file`: those of the file or mesh; faces without normals are "
+                               "flat. `smooth`: computed, at each vertex the mean of the faces around it, "
                                "weighted by their angles there (Thürmer and Wüthrich 1998); vertices at "
                                "the same place count as one. `flat`: none."},
                        {.name = "crease_angle_deg",
@@ -848,8 +854,8 @@ void addObjects(std::vector<SectionSchema>& all) {
                         .range = {.min = 0, .max = 180},
                         .unit = "degrees",
                         .fallback = "60",
-                        .doc = "Of `normals: smooth`: the most that two faces may be bent at their common "
-                               "edge and be shaded as one surface. An edge beyond which the surface is "
+                        .doc = "For `normals: smooth`: the largest angle between two faces at their common "
+                               "edge that are shaded as one surface. An edge beyond which the surface is "
                                "inside out is a crease, too."},
                        {.name = "transform",
                         .kind = Kind::Section,
@@ -861,9 +867,9 @@ void addObjects(std::vector<SectionSchema>& all) {
                         .kind = Kind::Choice,
                         .choices = {"auto", "always", "never"},
                         .fallback = "auto",
-                        .doc = "Whether all placements have one copy of the mesh in common: the memory of "
-                               "one, and rays that are slower where both fit. `auto`: where the object "
-                               "would be more than 4 million triangles otherwise. Surfaces that emit, and "
+                        .doc = "True if all placements share one copy of the mesh, which saves memory and "
+                               "makes rays slower. `auto` shares it if the object would otherwise have more "
+                               "than 4 million triangles. Surfaces that emit, and "
                                "places that flatten the mesh, never share."},
                        {.name = "transforms",
                         .kind = Kind::Section,
@@ -882,8 +888,7 @@ void addObjects(std::vector<SectionSchema>& all) {
                    "a part",
                    "",
                    {{.name = "material",
-                     .doc = "A name in `materials`, in place of the file's; what that emits (Ke) goes with "
-                            "it."},
+                     .doc = "A name in `materials`, instead of the file's material and its emission (Ke)."},
                     {.name = "emission",
                      .kind = Kind::Section,
                      .section = "emission",
@@ -892,7 +897,7 @@ void addObjects(std::vector<SectionSchema>& all) {
                      .kind = Kind::Choice,
                      .choices = {"any", "group", "object", "material"},
                      .fallback = "any",
-                     .doc = "What has the name."}}});
+                     .doc = "Kind of the name."}}});
     all.push_back({"mtl",
                    "an mtl",
                    "",
@@ -900,9 +905,9 @@ void addObjects(std::vector<SectionSchema>& all) {
                      .kind = Kind::Choice,
                      .choices = {"linear", "srgb"},
                      .fallback = "linear",
-                     .doc = "What Kd, Ks and Ke are: linear, as Mitsuba, pbrt and Blender read them, or "
-                            "sRGB-encoded. Of an encoded "
-                            "Ke above 1 the colour is decoded and the strength stays."}}});
+                     .doc = "Encoding of Kd, Ks and Ke: linear, as Mitsuba, pbrt and Blender read them, or "
+                            "sRGB. For an encoded Ke above 1 the colour is decoded and the strength "
+                            "stays."}}});
     all.push_back({"mesh",
                    "a mesh",
                    "",
@@ -1011,7 +1016,7 @@ void addObjects(std::vector<SectionSchema>& all) {
                     {.name = "two_sided",
                      .kind = Kind::Boolean,
                      .fallback = yaml(Emission{}.two_sided),
-                     .doc = "Whether the back side emits too."}}});
+                     .doc = "True if the back side emits too."}}});
 }
 
 void addOutside(std::vector<SectionSchema>& all) {
@@ -1025,7 +1030,7 @@ void addOutside(std::vector<SectionSchema>& all) {
          {constant,
           {.name = "image",
            .doc = "An EXR, HDR or PFM file of longitudes by latitudes, twice as wide as high, the zenith at "
-                  "the top; each pixel as a light of that `rgb`. Looked up beside the scene."},
+                  "the top; each pixel as a light of that `rgb`. Looked up in the scene's folder."},
           {.name = "scale",
            .kind = Kind::Number,
            .range = kNotNegative,
@@ -1042,7 +1047,8 @@ void addOutside(std::vector<SectionSchema>& all) {
            .count_min = 3,
            .count_max = 3,
            .fallback = "[0, 1, 0]",
-           .doc = "Where the top of `image` is. Its middle is towards −z, or +y where z is up."},
+           .doc = "The direction of the top of `image`. Its middle is towards −z, or +y where z is "
+                  "up."},
           {.name = "sky", .kind = Kind::Section, .section = "sky", .doc = "A CIE standard general sky."},
           {.name = "light_sampling",
            .kind = Kind::Boolean,
@@ -1066,8 +1072,8 @@ void addOutside(std::vector<SectionSchema>& all) {
                      .required = true,
                      .doc = "The name of the file, relative to the working directory. It lies below that "
                             "folder or the scene's own, is not hidden and ends as images do, because scenes "
-                            "come from anybody. A file that is there and is no image of crt's is replaced "
-                            "with `--overwrite` only. `-o` names any file."},
+                            "may come from untrusted sources. An existing file that is not an image by crt "
+                            "is replaced only with `--overwrite`. `-o` names any file."},
                     {.name = "format",
                      .kind = Kind::Choice,
                      .choices = {"exr", "png", "ppm", "pfm"},

@@ -25,7 +25,7 @@ void addThinFilm(std::vector<SectionSchema>& all) {
            .range = {.min = 0, .max = 20000},
            .unit = "nm",
            .required = true,
-           .doc = "How thick it is. 0: there is none."},
+           .doc = "Thickness; 0: no film."},
           {.name = "relative_thickness",
            .kind = Kind::Number,
            .range = {.min = 0, .max = 1},

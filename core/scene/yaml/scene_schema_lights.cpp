@@ -30,7 +30,7 @@ KeySchema vectorKey(std::string name, std::string doc, std::string unit = {}, bo
             .doc = std::move(doc)};
 }
 
-KeySchema positionKey() { return vectorKey("position", "Where it is.", "scene units", true); }
+KeySchema positionKey() { return vectorKey("position", "Position.", "scene units", true); }
 
 KeySchema spectrumKey() {
     return {.name = "spectrum",
@@ -38,8 +38,8 @@ KeySchema spectrumKey() {
             .range = kRadiance,
             .fallback = "{illuminant: D65}",
             .doc =
-                "Its colour: multiplied by what gives the value in lumens, watts and so on that the "
-                "other key asks for."};
+                "Its colour, scaled so that the light has the value in lumens, watts and so on of the other "
+                "key."};
 }
 
 /// In absolute terms, by wavelength.
@@ -139,17 +139,18 @@ void addLights(std::vector<SectionSchema>& all) {
           positionKey(),
           {.name = "file",
            .required = true,
-           .doc = "The IES file; looked up beside the scene, then in CRT_MESH_PATH."},
+           .doc = "The IES file; looked up in the scene's folder, then in CRT_MESH_PATH."},
           vectorKey("direction",
-                    "Where the vertical angle 0 is: down, for a lamp that hangs as measured; any length but "
+                    "Direction of the vertical angle 0: down, for a lamp that hangs as measured; "
+                    "any length but "
                     "0. `[0, -1, 0]` when left out."),
           vectorKey("target", "Or a point there.", "scene units"),
           vectorKey("c0",
-                    "Where the horizontal angle 0 is; what goes along the direction does not count. Further "
+                    "Direction of the horizontal angle 0; only its part across the axis counts. Larger "
                     "angles go counter-clockwise as seen from behind the lamp. `[1, 0, 0]`, or `[0, 0, 1]` "
                     "where that is the direction, when left out."),
           amountKey("scale", "", "Times the candelas of the file; 1 when left out."),
-          amountKey("luminous_flux_lm", "lm", "Or what all of the light is to be."),
+          amountKey("luminous_flux_lm", "lm", "Or the total luminous flux."),
           amountKey("power_w", "W", "Or its radiant flux, from 360 to 830 nm."),
           spectrumKey()},
          {{KeyRule::Kind::AtMostOne, {"direction", "target"}},
@@ -180,7 +181,8 @@ void addLights(std::vector<SectionSchema>& all) {
            .unit = "scene units",
            .doc = "Width and height of a slit."},
           vectorKey("up",
-                    "The way of a slit's height; what goes along the direction does not count. `[0, 1, 0]`, "
+                    "Direction of a slit's height; only its part across the light's direction counts. `[0, "
+                    "1, 0]`, "
                     "or `[0, 0, 1]` where that is the direction, when left out."),
           spectralKey("irradiance", "W·m⁻²·nm⁻¹", "Irradiance of a plane across it."),
           amountKey("illuminance_lx", "lx", "Illuminance of a plane across it."),

@@ -18,7 +18,7 @@ void addAnisotropy(std::vector<SectionSchema>& all) {
              .kind = Kind::Number,
              .range = {.min = 0, .max = 1},
              .fallback = "0",
-             .doc = "How much sharper reflections are across the tangent than along it, as of brushed "
+             .doc = "Anisotropy: reflections are sharper across the tangent than along it, as for brushed "
                     "metal. As in OpenPBR Surface 1.1, with a for it and r for `roughness`: GGX's width is "
                     "r² √(2 / (1 + (1 − a)²)) along the tangent and 1 − a times that across, "
                     "here at least 1/50 of it, so that above 0.98 nothing changes. The tangent is the "
@@ -82,16 +82,18 @@ void addOpenPbr(std::vector<SectionSchema>& all) {
         "A part of [OpenPBR Surface 1.1](https://academysoftwarefoundation.github.io/OpenPBR/), by its "
         "names: base, specular, transmission, coat, thin film, fuzz, emission and opacity. It becomes "
         "materials of crt, mixed by `base_metalness`, `transmission_weight` and `coat_weight`, and all "
-        "light is spectral. A metal is a `rough_conductor` that reflects F82-tint's curve (below 0 beside "
-        "the dip of a dark tint: 0). A glossy base is a `plastic` in the reciprocal form of the "
+        "light is spectral. A metal is a `rough_conductor` that follows the F82-tint curve, clamped at 0 "
+        "where a dark tint would make it negative. A glossy base is a `plastic` in the reciprocal form of "
+        "the "
         "specification, which gives `base_color` to what comes out of the gloss; a clear one is a "
-        "`rough_dielectric`, its `specular_weight` an index. Rough surfaces give back what microfacets "
-        "lose, as elsewhere in crt. Subsurface and thin walls are refused where they would be seen, and so "
-        "is what the material that it becomes has not; the message says what to write instead. Keys of the "
-        "specification that are not in this table are unknown.",
+        "`rough_dielectric`, its `specular_weight` an index. Rough surfaces compensate the energy loss of "
+        "microfacets, as elsewhere in crt. Subsurface and thin walls are refused where they would be "
+        "visible, and so are features that crt's own material lacks; the message says what to write "
+        "instead. Other keys of the specification are unknown.",
         {typeKey("openpbr", "material"), weight("base_weight", "1", "Factor on `base_color`."),
          color("base_color", "0.8",
-               "Of metals what they reflect straight on, of others what comes out of the base.", true),
+               "For metals the reflectance at normal incidence, for other materials the colour of the base.",
+               true),
          weight("base_diffuse_roughness", "0",
                 "As `roughness` of `diffuse`, of what comes out of the gloss."),
          weight("base_metalness", "0", "Share of the surface that is metal.", true),
@@ -103,32 +105,33 @@ void addOpenPbr(std::vector<SectionSchema>& all) {
          weight("specular_roughness", "0.3", "As `roughness` of `rough_conductor`.", true),
          weight("specular_roughness_anisotropy", "0", "As `roughness_anisotropy` of `rough_conductor`."),
          amount("anisotropy_rotation_deg", {.min = -360, .max = 360}, "0",
-                "Turns the tangent, counter-clockwise seen from the outside. Not of the specification, "
-                "which leaves the tangent to others.",
+                "Turns the tangent, counter-clockwise seen from the outside. Not part of the specification, "
+                "which does not define the tangent.",
                 "degrees"),
          amount("specular_ior", {.min = 1e-3, .max = 1e3}, "1.5",
                 "Refractive index of the inside relative to the outside, at 587.6 nm."),
          weight("transmission_weight", "0", "Share of the dielectric that is clear.", true),
-         color("transmission_color", "1", "What is left of white light after `transmission_depth`."),
-         amount("transmission_depth", kNotNegative, "0", "How far light goes until then.", "scene units"),
+         color("transmission_color", "1", "Transmittance over `transmission_depth`."),
+         amount("transmission_depth", kNotNegative, "0", "Distance of that transmittance.", "scene units"),
          weight("transmission_dispersion_scale", "0",
                 "0: the index is the same at all wavelengths; 1: Abbe's number is the next key."),
          amount("transmission_dispersion_abbe_number", kPositive, "20",
                 "Over the scale it is Abbe's number; the index follows Cauchy's two terms."),
          weight("thin_film_weight", "0", "Share of the surface that has a film."),
-         amount("thin_film_thickness", {.min = 0, .max = 20}, "0.5", "How thick the film is.", "µm"),
+         amount("thin_film_thickness", {.min = 0, .max = 20}, "0.5", "Thickness of the film.", "µm"),
          amount("thin_film_ior", {.min = 0.1, .max = 10}, "1.4", "Its index relative to the outside."),
-         refused("subsurface_weight", "no light wanders below surfaces."),
+         refused("subsurface_weight", "crt has no subsurface scattering."),
          weight("coat_weight", "0",
-                "Share of the surface that a coat lies on: a clear or tinted dielectric, like lacquer. It "
-                "mirrors white; what lies below gets the rest, and has the index `specular_ior` relative to "
+                "Share of the surface that a coat lies on: a clear or tinted dielectric, like lacquer. Its "
+                "reflection is white; the layers below get the rest, and has the index `specular_ior` "
+                "relative to "
                 "the coat's (or the inverse, where that is above 1). A clear base has no coat.",
                 true),
          color("coat_color", "1",
-               "What is left of white light that crosses the coat straight on, in and out. Along the "
-               "surface its way is longer, and the colour deeper."),
+               "Transmittance of the coat at normal incidence, in and out. At grazing angles the path is "
+               "longer and the colour deeper."),
          weight("coat_roughness", "0",
-                "As `roughness` of `plastic`. What is seen through a rough coat is rougher: "
+                "As `roughness` of `plastic`. Layers below a rough coat look rougher: "
                 "(`specular_roughness`⁴ + 2 `coat_roughness`⁴)^¼, at most 1."),
          weight("coat_roughness_anisotropy", "0", "Above 0 it is refused where the coat is rough."),
          amount("coat_ior", {.min = 1e-3, .max = 1e3}, "1.6",
@@ -137,13 +140,12 @@ void addOpenPbr(std::vector<SectionSchema>& all) {
                 "1: the base gets darker and more saturated under the coat, which sends light back to it; "
                 "0: it keeps its colour."),
          weight("fuzz_weight", "0",
-                "Share of the surface that fibres stand on, like velvet or dust: bright along the surface "
-                "(Zeltner, Burley and Chiang 2022). What they take of light towards the viewer, whatever "
-                "their colour, is missing from what lies below. Seen from inside a clear body there are "
-                "none."),
-         color("fuzz_color", "1", "Of what the fibres take, the share that they send on."),
+                "Share of the surface that is covered by fibres, like velvet or dust: bright at grazing "
+                "angles (Zeltner, Burley and Chiang 2022). The layers below lose all the light that the "
+                "fibres intercept, whatever their colour. They are invisible from inside a clear body."),
+         color("fuzz_color", "1", "Reflectance of the fibres."),
          weight("fuzz_roughness", "0.5",
-                "How much the fibres lean apart: 0 is a thin rim, 1 dust. Below 0.01 it is 0.01."),
+                "Spread of the fibres: 0 is a thin rim, 1 dust. Below 0.01 it is 0.01."),
          amount("emission_luminance", kNotNegative, "0",
                 "Light that the front side emits, equally in all directions, on top of what it scatters. "
                 "`geometry_opacity` takes its share. An object of this material has no `emission` then, and "

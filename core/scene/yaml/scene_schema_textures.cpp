@@ -52,10 +52,11 @@ void addTextures(std::vector<SectionSchema>& all) {
          "a texture",
          "An image on a surface with texture coordinates (`uvs` of a mesh, `vt` of an OBJ): (0, 0) is the "
          "lower left corner of the image, (1, 1) the upper right. Colours become spectra as `rgb` does; "
-         "alpha is looked at where `channel` asks for it.",
+         "alpha is used only with `channel: alpha`.",
          {{.name = "texture",
            .required = true,
-           .doc = "A PNG, JPEG, TGA, EXR, Radiance HDR or PFM, by content; looked up beside the scene, then "
+           .doc = "A PNG, JPEG, TGA, EXR, Radiance HDR or PFM, by content; looked up in the scene's folder, "
+                  "then "
                   "in CRT_MESH_PATH. Or a glTF file or GLB, with `image`. Colours of an EXR with alpha, "
                   "which are multiplied by it, are divided by it. EXPOSURE of an HDR, gAMA of a PNG and the "
                   "EXIF orientation of a JPEG are ignored, with a warning where they would change the "
@@ -63,13 +64,13 @@ void addTextures(std::vector<SectionSchema>& all) {
           {.name = "image",
            .kind = Kind::Integer,
            .range = {0, 1e9, false, false},
-           .doc = "Which image of a glTF file or GLB, counted from 0."},
+           .doc = "Number of the image in a glTF file or GLB, from 0."},
           {.name = "color_space",
            .kind = Kind::Choice,
            .choices = {"auto", "srgb", "linear", "raw"},
            .fallback = "auto",
-           .doc = "Are the numbers sRGB-encoded, linear, or to be taken as they are (`raw`: for what is no "
-                  "colour)? `auto` is srgb for 8 and 16 bits, linear for floats, raw where the key wants a "
+           .doc = "Encoding of the numbers: sRGB, linear, or unchanged (`raw`, for data other than "
+                  "colours). `auto` is srgb for 8 and 16 bits, linear for floats, raw where the key wants a "
                   "number. Reflectances above 1 are clamped, with a warning."},
           {.name = "channel",
            .kind = Kind::Choice,
@@ -89,7 +90,8 @@ void addTextures(std::vector<SectionSchema>& all) {
           {.name = "cutoff",
            .kind = Kind::Number,
            .range = {0, 1, false, false},
-           .doc = "Where the key wants a number: texels below it are 0, those from it on are 1, before "
+           .doc = "Where the key wants a number: texels below it are 0, those from it on are 1, "
+                  "before "
                   "`factor`."},
           {.name = "filter",
            .kind = Kind::Choice,

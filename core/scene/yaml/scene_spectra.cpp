@@ -40,8 +40,7 @@ std::optional<std::size_t> worstWavelength(const Spectrum& spectrum, const Value
 
 std::string outsideQuestion(double first_nm, double last_nm) {
     return fmt::format(
-        "the data go from {} to {} nm and crt renders {} to {} nm; say what holds beyond them: 'outside: "
-        "clamp' or 'outside: zero'",
+        "the data go from {} to {} nm and crt renders {} to {} nm; add 'outside: clamp' or 'outside: zero'",
         first_nm, last_nm, kWavelengthMin_nm, kWavelengthMax_nm);
 }
 
@@ -54,7 +53,7 @@ SpectrumReader::SpectrumReader(Diagnostics& out, SceneFiles& files, const YamlNo
         entry_of_.emplace(entry.key, &entry);
         if (looksLikeNumber(entry.key) || entry.key.empty())
             out_.error(entry.key_place,
-                       fmt::format("'{}' cannot name a spectrum: where it is used it would be a number",
+                       fmt::format("'{}' cannot be the name of a spectrum: it would be read as a number",
                                    entry.key));
     }
 }
@@ -161,8 +160,8 @@ std::optional<Spectrum> SpectrumReader::resolveName(const std::string& name, con
     const auto known = resolved_.find({name, use});
     if (known != resolved_.end()) return known->second;
     if (open_.size() >= kDeepestSpectrum) {
-        out_.error(place, fmt::format("spectrum '{}' is the {}th in a chain of spectra, each of which names "
-                                      "the next: chains may have {}",
+        out_.error(place, fmt::format("spectrum '{}' is the {}th in a chain of references to other spectra: "
+                                      "a chain may have {}",
                                       name, kDeepestSpectrum + 1, kDeepestSpectrum));
         return std::nullopt;
     }
@@ -250,7 +249,7 @@ std::optional<Spectrum> SpectrumReader::file(const SectionReader& form) {
         return readSpectrumFile(*path, Outside::Error);
     } catch (const Error& e) {
         form.error(form.has("outside") ? "outside" : "file", sentenceWithPlace(e),
-                   "say 'outside: clamp' or 'outside: zero'");
+                   "add 'outside: clamp' or 'outside: zero'");
         return std::nullopt;
     }
 }
@@ -273,7 +272,7 @@ std::optional<Spectrum> SpectrumReader::rgb(const SectionReader& form, SpectrumU
     const double brightest = *std::max_element(color.begin(), color.end());
     if (brightest > 1 && use == SpectrumUse::Absorption) {
         form.error("rgb", fmt::format("a component of this absorption is {}, beyond 1", brightest),
-                   "divide all three, and say by how much in 'scale'");
+                   "divide all three, and give the factor as 'scale'");
         return std::nullopt;
     }
     if (brightest > 1 && (!linear || use == SpectrumUse::Reflectance)) {
@@ -311,11 +310,11 @@ std::optional<Spectrum> SpectrumReader::data(const SectionReader& form) {
     }
     const std::vector<std::string> known = dataSpectrumNames();
     const bool has_columns = std::find(known.begin(), known.end(), name + "/n") != known.end();
-    form.error("data", fmt::format("there are no data '{}'", name),
+    form.error("data", fmt::format("there is no data set '{}'", name),
                has_columns                             ? fmt::format("write {0}/n or {0}/k", name)
                : out_.worthSuggesting(known.size()) ? didYouMean(name, known)
                                                        : "",
-               fmt::format("'crt data' lists what there is, here and in {}",
+               fmt::format("'crt data' lists all data sets, here and in {}",
                            fmt::join(dataDirectories(), ", ")));
     return std::nullopt;
 }

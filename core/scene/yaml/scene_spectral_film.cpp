@@ -21,7 +21,7 @@ SpectralBins readBins(const SectionReader& section) {
     else
         section.error("bins", fmt::format("{} bins from {} to {} nm are narrower than {} nm", count,
                                           bins.from_nm, bins.to_nm, kNarrowestBin_nm),
-                      fmt::format("ask for {} at most",
+                      fmt::format("use at most {}",
                                   static_cast<int>((bins.to_nm - bins.from_nm) / kNarrowestBin_nm)));
     return {};
 }
@@ -38,8 +38,8 @@ void readResponses(const SectionReader& film, const YamlNode& map, SpectrumReade
         }
         if (!isResponseName(entry.key))
             out.error(entry.key_place,
-                      fmt::format("'{}' cannot name a response: it becomes an EXR channel, so it is 1 to {} "
-                                  "letters, digits, '_' or '-'",
+                      fmt::format("'{}' cannot be the name of a response: it becomes an EXR channel, so it "
+                                  "needs 1 to {} letters, digits, '_' or '-'",
                                   entry.key, kMostResponseName));
         std::optional<Spectrum> spectrum =
             spectra.read(*entry.value, entry.place, fmt::format("response '{}'", entry.key), range,

@@ -41,7 +41,7 @@ bool readDate(const SectionReader& section, Moment& when) {
     if (!section.read("date", text)) return false;
     const std::optional<std::vector<int>> ymd = numbersIn(text, 4, '-');
     if (!ymd || ymd->size() != 3) {
-        section.error("date", fmt::format("'{}' is no date", text), "write 2026-06-21");
+        section.error("date", fmt::format("'{}' is not a date", text), "write 2026-06-21");
         return false;
     }
     if (!isDate((*ymd)[0], (*ymd)[1], (*ymd)[2])) {
@@ -50,7 +50,8 @@ bool readDate(const SectionReader& section, Moment& when) {
     }
     constexpr int kFirst = 1950, kLast = 2050;  // Of the formulae's accuracy.
     if ((*ymd)[0] < kFirst || (*ymd)[0] > kLast) {
-        section.error("date", fmt::format("the sun's place is known for {} to {}", kFirst, kLast));
+        section.error("date", fmt::format("crt computes the position of the sun for {} to {}",
+                                          kFirst, kLast));
         return false;
     }
     when.year = (*ymd)[0], when.month = (*ymd)[1], when.day = (*ymd)[2];
@@ -63,7 +64,7 @@ bool readTime(const SectionReader& section, Moment& when) {
     const std::optional<std::vector<int>> hms = numbersIn(text, 2, ':');
     if (!hms || hms->size() < 2 || hms->size() > 3 || (*hms)[0] > 23 || (*hms)[1] > 59 ||
         (hms->size() == 3 && (*hms)[2] > 59)) {
-        section.error("time", fmt::format("'{}' is no time of day", text), "write 14:30 or 14:30:00");
+        section.error("time", fmt::format("'{}' is not a time of day", text), "write 14:30 or 14:30:00");
         return false;
     }
     when.hours = (*hms)[0] + (*hms)[1] / 60.0 + (hms->size() == 3 ? (*hms)[2] / 3600.0 : 0);
@@ -77,14 +78,14 @@ std::optional<Vec3d> towards(const SectionReader& section, const SolarPosition& 
     section.read("up", up);
     const std::optional<Vec3d> zenith = unitVector(up), given = unitVector(north);
     if (!zenith || !given) {
-        section.error(zenith ? "north" : "up", "a direction of length 0 leads nowhere");
+        section.error(zenith ? "north" : "up", "a direction cannot have length 0");
         return std::nullopt;
     }
     const Vec3d flat = *given - *zenith * dot(*given, *zenith);
     constexpr double kParallel = 1e-9;
     if (!(length(flat) > kParallel)) {
         section.error(section.has("north") ? "north" : "up",
-                      "north is up, so it leads nowhere on the ground");
+                      "'north' is parallel to 'up', so it has no direction on the ground");
         return std::nullopt;
     }
     const Vec3d ahead = flat * (1 / length(flat)), east = cross(ahead, *zenith);
@@ -105,7 +106,7 @@ std::optional<Vec3d> readTowardsSun(const SectionReader& section, double diamete
     Vec3d way{};
     if (section.read("direction", way)) {
         const std::optional<Vec3d> unit = unitVector(way);
-        if (!unit) section.error("direction", "a direction of length 0 leads nowhere");
+        if (!unit) section.error("direction", "a direction cannot have length 0");
         return unit ? std::optional(*unit * -1) : std::nullopt;
     }
     Moment when;
@@ -120,7 +121,7 @@ std::optional<Vec3d> readTowardsSun(const SectionReader& section, double diamete
     if (sun.elevation_deg <= -diameter_deg / 2) {
         section.error(
             "time", fmt::format("the sun is {:.1f} degrees below the horizon then", -sun.elevation_deg),
-            section.has("utc_offset") ? "" : "is 'time' local time? Then say 'utc_offset' in hours");
+            section.has("utc_offset") ? "" : "if 'time' is local time, add 'utc_offset' in hours");
         return std::nullopt;
     }
     return towards(section, sun);

@@ -65,13 +65,13 @@ std::optional<Texture> TextureReader::readAttribute(const SectionReader& form, c
     const bool colors = attribute == "colors";
     if (colors == (kind == TexelKind::Numbers)) {
         form.error("attribute",
-                   colors ? fmt::format("{} is a number, and colours of vertices are colours", what)
-                          : fmt::format("{} is a colour, and opacities of vertices are numbers", what));
+                   colors ? fmt::format("{} is a number and cannot use colours of vertices", what)
+                          : fmt::format("{} is a colour and cannot use opacities of vertices", what));
         return std::nullopt;
     }
     if (!colors) return opacityOfVertices(form);
     for (const char* key : {"cutoff", "factor"})
-        if (form.has(key)) form.error(key, "this is about opacities; colours are taken as they are");
+        if (form.has(key)) form.error(key, "this key is for opacities, not for colours");
     Texture texture;
     texture.kind = Texture::Kind::VertexColors;
     return texture;
@@ -145,7 +145,8 @@ std::optional<Texture> TextureReader::readImage(const SectionReader& form, Texel
         use.color = TexelColor::Auto;
         if (space == "srgb" || space == "linear")
             form.error("color_space",
-                       fmt::format("the texels are numbers here, not colours; '{}' would bend them", space),
+                       fmt::format("the texels are numbers here, not colours; '{}' would change them",
+                                   space),
                        "write 'color_space: raw', or leave it out");
         form.readEnum("channel", use.channel);
     } else if (form.has("channel")) {

@@ -94,7 +94,7 @@ void checkView(const SectionReader& section, const Camera& camera) {
     const double view_length = length(view), up_length = length(camera.up);
     const std::string_view aim = section.has("target") ? "target" : "position";
     if (view_length == 0)
-        return section.error(aim, "position and target are the same point, so the camera looks nowhere");
+        return section.error(aim, "position and target are the same point, so the camera has no direction");
     if (!std::isfinite(view_length))
         return section.error(aim, "position and target are too far apart for a double");
     if (up_length == 0) return section.error("up", "up has length 0");
@@ -104,7 +104,7 @@ void checkView(const SectionReader& section, const Camera& camera) {
     const Vec3d side{v[1] * u[2] - v[2] * u[1], v[2] * u[0] - v[0] * u[2], v[0] * u[1] - v[1] * u[0]};
     if (length(side) < kParallel)
         section.error(section.has("up") ? "up" : aim,
-                      "up is parallel to the view, so the picture could be turned any way",
+                      "up is parallel to the view, so the rotation of the image is undefined",
                       section.has("up") ? "" : "set 'up', which is [0, 1, 0] when left out");
 }
 
@@ -165,7 +165,8 @@ void readSampler(const SectionReader& section, SamplerSettings& settings) {
     if (section.read("replicates", settings.replicates) &&
         !std::has_single_bit(static_cast<unsigned>(settings.replicates)))
         section.error("replicates",
-                      fmt::format("{} replicates cannot be had: 2, 4, 8 or 16, or 1 for a single sequence",
+                      fmt::format("{} replicates are not available: use 2, 4, 8 or 16, or 1 for a single "
+                                  "sequence",
                                   settings.replicates));
 }
 
@@ -203,7 +204,7 @@ void readOutput(const SectionReader& section, std::vector<Output>& outputs) {
                 output.aovs |= aovNamed(key.choices[choice]);
         }
         if (!list->items.empty() && format_known && output.format != OutputFormat::Exr)
-            section.error("aovs", "only exr files hold more than the image");
+            section.error("aovs", "only exr files can hold AOVs");
     }
     outputs.push_back(std::move(output));
 }
@@ -300,7 +301,7 @@ std::string readSceneText(const std::string& path) {
                                                               : "this ") +
                                      why +
                                      (large  ? "; put large meshes into OBJ files"
-                                      : pipe ? "; for standard input write '-'"
+                                      : pipe ? "; write '-' for standard input"
                                              : ""));
     }
 }

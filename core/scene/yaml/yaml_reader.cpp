@@ -77,7 +77,8 @@ std::string tabHint(const YamlSource& source, int line) {
     if (line < 1 || static_cast<std::size_t>(line) > source.lines.size()) return {};
     const std::string& text = source.lines[static_cast<std::size_t>(line) - 1];
     const std::size_t first = text.find_first_not_of(' ');
-    return first != std::string::npos && text[first] == '\t' ? "indent with blanks; YAML has no tabs there"
+    return first != std::string::npos && text[first] == '\t' ? "indent with spaces; YAML does not allow "
+                                                               "tabs there"
                                                              : "";
 }
 
@@ -129,7 +130,7 @@ public:
         const YamlPlace place = placeOf(mark);
         const auto found = anchors_.find(anchor);
         const bool cyclic = found != anchors_.end() && open_anchors_.contains(anchor);
-        if (cyclic) out_.error(place, "this alias is inside the value it stands for: a cycle has no end");
+        if (cyclic) out_.error(place, "this alias is inside its own value: a cycle is not possible");
         if (found == anchors_.end() || cyclic) {
             auto node = make(YamlKind::Null, place);
             node->reported = cyclic;
@@ -201,7 +202,7 @@ private:
 
     void refuseTag(const std::string& tag, const YamlPlace& place) {
         if (tag.empty() || tag == "?" || tag == "!") return;
-        out_.error(place, fmt::format("the YAML tag '{}' means nothing in a scene; leave it out", tag));
+        out_.error(place, fmt::format("a scene has no YAML tags; remove '{}'", tag));
     }
 
     bool expectsKey() const {
@@ -249,7 +250,8 @@ private:
             frame.key_place = place;
             frame.key_bad = true;
             if (!not_a_key.empty()) {
-                out_.error(place, fmt::format("{} is not possible here: keys are plain names", not_a_key));
+                out_.error(place, fmt::format("{} is not possible here: keys must be plain names",
+                                              not_a_key));
                 return;
             }
             frame.key = node->text;

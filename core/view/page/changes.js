@@ -10,7 +10,7 @@ let changes = noChanges();
 let sending = false;
 const mostAtOnce = 100;
 
-/// How two changes of one key become one: within what the program takes, or null.
+/// Combines two changes of one key into one: within the limits of the program, or null.
 const within = (least, most, value) => value >= least && value <= most ? value : null;
 const sumOfPairs = (one, other) => {
   const sum = [one[0] + other[0], one[1] + other[1]];

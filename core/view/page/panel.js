@@ -1,4 +1,4 @@
-// What stands beside the picture.
+// The panel next to the image.
 const planes = planeKeys;
 for (const plane of planes) {
   const button = element("button", plane, { type: "button" });
@@ -75,7 +75,7 @@ function showStatus(status) {
   document.title = (status.title || status.file) + " – crt view";
   setText("device", [status.backend, status.device].filter(Boolean).join(" on "));
   const preview = status.picture && status.picture.divisor > 1;
-  setText("waiting", status.stage || (status.scene_error ? "" : "waiting for the first picture"));
+  setText("waiting", status.stage || (status.scene_error ? "" : "waiting for the first image"));
   setText("samples", preview ? "preview" : String(status.samples));
   setText("wanted", preview ? "at 1/" + status.picture.divisor + " of the size"
     : "of " + status.samples_wanted + " samples");
@@ -143,10 +143,10 @@ by("help-button").addEventListener("click", () => by("help").showModal());
 by("copy").addEventListener("click", async () => {
   try {
     await navigator.clipboard.writeText(view.status.camera_yaml);
-    say("The camera is in the clipboard: put it into the scene's section 'camera'.");
+    say("The camera is in the clipboard: paste it into the scene's section 'camera'.");
   } catch {
     getSelection().selectAllChildren(by("yaml"));
-    say("The browser gives no way to the clipboard: the text is selected instead.");
+    say("The browser does not allow access to the clipboard; the text is selected instead.");
   }
 });
 for (const [button, file] of [["save", "/image.exr"], ["save-png", "/image.png"]])

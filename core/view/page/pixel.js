@@ -2,7 +2,7 @@
 const probe = {
   at: null,        // The pixel of the film; null: none.
   size: "",        // Of the film that it is a pixel of.
-  run: null,       // Whose numbers are shown; null: none are.
+  run: null,       // The pixel whose numbers are shown; null: none.
   number: 0,       // Of the picture at the time of the request.
   reading: false,
 };

@@ -5,8 +5,8 @@ const canvas = by("canvas");
 const paper = canvas.getContext("2d");
 const view = {
   status: null,      // As the program last said it.
-  picture: null,     // What of it is on the canvas.
-  frames: 0,         // Pictures drawn: for whoever measures.
+  picture: null,     // The part of the state that is on the canvas.
+  frames: 0,         // Number of images drawn, for measurements.
   version: 0,
   connected: false,
 };
@@ -67,7 +67,7 @@ async function look() {
   const picture = view.picture ? view.picture.number : 0;
   const reply = await fetch(address("/sight", { after: view.version, picture }),
     { signal: AbortSignal.timeout(25000) });
-  if (reply.status === 403) throw new Error("the token of this page is not that of the program any more");
+  if (reply.status === 403) throw new Error("the token of this page is no longer valid");
   if (!reply.ok) throw new Error("the program ends");
   const bytes = await reply.arrayBuffer();
   const length = new DataView(bytes).getUint32(0, true);
@@ -144,11 +144,12 @@ function showNotes() {
   const status = view.status || {};
   const notes = [];
   if (!view.connected && view.status)
-    notes.push(["The program does not answer. The picture is the last one; it goes on when crt view does.", "",
+    notes.push(["crt view does not respond. This is its last image; the page continues when crt view does.",
+                "",
       true]);
   if (status.scene_error)
-    notes.push([view.picture ? "The scene cannot be read as it is. The picture is of the last one that could."
-      : "The scene cannot be read as it is.", status.scene_error, true]);
+    notes.push([view.picture ? "The scene has errors. The image shows its last version without errors."
+      : "The scene has errors.", status.scene_error, true]);
   if (status.render_error) notes.push(["Nothing is rendered.", status.render_error, true]);
   for (const warning of status.warnings || [])
     if (!dismissed.has(warning)) notes.push([warning, "", false, true]);

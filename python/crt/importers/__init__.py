@@ -37,9 +37,9 @@ def import_scene(path, parameters=None):
     """
     path = pathlib.Path(path)
     if not is_foreign(path):
-        raise Error(f"'{path}' is no scene of Mitsuba (.xml) or pbrt (.pbrt, .pbrt.gz)", Kind.USAGE)
+        raise Error(f"'{path}' is not a Mitsuba (.xml) or pbrt (.pbrt, .pbrt.gz) scene", Kind.USAGE)
     if not path.is_file():
-        raise Error(f"'{path}' is not there", Kind.SCENE)
+        raise Error(f"'{path}' does not exist", Kind.SCENE)
     if path.suffix.lower() == ".xml":
         from . import mitsuba as reader
     else:

@@ -11,14 +11,14 @@ from . import import_scene, is_foreign
 
 def parser():
     made = argparse.ArgumentParser(
-        prog="crt import", description="write a scene that shows what a scene of another program shows",
+        prog="crt import", description="convert a scene of another program",
         epilog="Models (.glb, .gltf, .obj, .ply) go to the program crt: crt import MODEL --help.")
     made.add_argument("scene", metavar="SCENE",
                       help="a scene of Mitsuba 3 (.xml) or pbrt-v4 (.pbrt, .pbrt.gz)")
     made.add_argument("-o", "--output", metavar="YAML", default="-",
-                      help="the scene to write, with NAME.meshes beside it where there are meshes; standard "
-                           "output when left out, or -")
-    made.add_argument("--overwrite", action="store_true", help="replace a scene that is there")
+                      help="output scene, with meshes in the folder NAME.meshes next to it; standard output "
+                           "by default, or -")
+    made.add_argument("--overwrite", action="store_true", help="replace an existing scene")
     made.add_argument("-D", "--define", metavar="NAME=VALUE", action="append", default=[],
                       help="the value of $NAME in a scene of Mitsuba")
     return made
@@ -39,7 +39,7 @@ def main(arguments):
     made = import_scene(given.scene, definitions(given.define))
     remarks = [f"From {os.path.basename(given.scene)}."]
     if made.losses:
-        remarks += ["Features that crt does not have, where each occurs first, and what it uses instead:",
+        remarks += ["Unsupported features, with the first place of each and crt's replacement:",
                     *(f"  {loss}".replace("\n", " ") for loss in made.losses)]
     if given.output == "-":
         sys.stdout.write(writing.to_text(made.content, remarks))

@@ -44,11 +44,11 @@ def unpacked(data, form, most=None):
     try:
         made = stream.decompress(data, most + 1)
     except zlib.error as error:
-        raise Damaged(f"it is no whole packed file: {error}") from None
+        raise Damaged(f"the packed file is damaged: {error}") from None
     if len(made) > most:
         raise Damaged(f"unpacked it is more than {most / 1e6:.0f} MB, {UNPACKED_RATIO} times its size")
     if not stream.eof:
-        raise Damaged("it is no whole packed file: its end is missing")
+        raise Damaged("the packed file is incomplete: its end is missing")
     return made, stream.unused_data
 
 
@@ -57,7 +57,7 @@ def ply_header(data):
     header ends."""
     end = data.find(b"end_header")
     if not data.startswith(b"ply") or end < 0:
-        raise Damaged("it is no PLY file")
+        raise Damaged("it is not a PLY file")
     kind, elements = None, []
     try:
         for line in data[:end].decode("latin-1").splitlines()[1:]:
@@ -71,7 +71,7 @@ def ply_header(data):
             elif words[:1] == ["property"]:
                 elements[-1][2].append((words[2], TYPES[words[1]], None))
     except (KeyError, IndexError, ValueError):
-        raise Damaged(f"its header has a line that is no PLY: {line.strip()!r}") from None
+        raise Damaged(f"its header has an invalid line: {line.strip()!r}") from None
     if kind not in ("ascii", "binary_little_endian", "binary_big_endian"):
         raise Damaged(f"its format is '{kind}'")
     return kind, elements, data.index(b"\n", end) + 1
@@ -100,7 +100,7 @@ def read_ply(path):
     try:
         for name, count, properties in elements:
             if not 0 <= count <= len(data):
-                raise Damaged(f"it says that it has {count} of '{name}', and is too short for them")
+                raise Damaged(f"it is too short for {count} of '{name}'")
             if any(counts for _, _, counts in properties):
                 rows, offset = lists(data, offset, words, order, count, properties)
             elif words is not None:
@@ -114,7 +114,7 @@ def read_ply(path):
             found[name] = rows
         return mesh_of(found)
     except (StopIteration, ValueError, struct.error, KeyError):
-        raise Damaged("it ends too early, or has something else than numbers") from None
+        raise Damaged("it ends too early, or has something other than numbers") from None
 
 
 def lists(data, offset, words, order, count, properties):
@@ -190,7 +190,7 @@ def checked(mesh):
                 raise Damaged(f"a number of its {key} is not finite")
     faces, vertices = mesh["faces"], len(mesh["positions"])
     if len(faces) and not 0 <= int(faces.min()) <= int(faces.max()) < vertices:
-        raise Damaged(f"a face names a vertex that is none of its {vertices}")
+        raise Damaged(f"a face uses a vertex that is not among its {vertices}")
     if not len(faces):
         raise Damaged("it has no faces")
     return mesh
@@ -208,7 +208,7 @@ def read_obj(path):
                 found = [indices(corner, rows) for corner in rest]
                 corners += [found[k] for i in range(1, len(found) - 1) for k in (0, i, i + 1)]
     except (ValueError, IndexError):
-        raise Damaged(f"it has a line that is no OBJ: {line[:60].decode('latin-1')!r}") from None
+        raise Damaged(f"it has an invalid line: {line[:60].decode('latin-1')!r}") from None
     if not corners:
         raise Damaged("it has no faces")
     unique, faces = np.unique(np.array(corners), axis=0, return_inverse=True)
@@ -217,7 +217,7 @@ def read_obj(path):
         if key == "positions" or (len(rows[word]) and (unique[:, column] >= 0).all()):
             table = np.array(rows[word], float)
             if unique[:, column].max() >= len(table) or unique[:, column].min() < 0:
-                raise Damaged(f"a face names a '{word.decode()}' that is none of its {len(table)}")
+                raise Damaged(f"a face uses a '{word.decode()}' that is not among its {len(table)}")
             made[key] = table[unique[:, column]]
     return checked(made)
 

@@ -236,7 +236,7 @@ class Importer:
         direction = plugin.triple("direction", None)
         direction = self.forward(plugin, plugin.transform()) if direction is None else direction
         if matrices.unit(direction) is None:
-            refuse(plugin.place, f"{plugin} goes nowhere: its direction is 0")
+            refuse(plugin.place, f"the direction of {plugin} is 0")
         self.scene.lights.append({"type": "directional", "direction": direction,
                                   "irradiance": self.values.emission(plugin, "irradiance")})
 
@@ -295,7 +295,7 @@ class Importer:
         if plugin.kind == "instance":
             group = next((part for part in plugin.all("shape") if part.kind == "shapegroup"), None)
             if group is None:
-                self.losses.add(plugin.place, "an instance of no shapegroup")
+                self.losses.add(plugin.place, "an instance without a shapegroup")
                 return
             self.groups.setdefault(id(group), (group, []))[1].append(plugin.transform())
             return

@@ -222,8 +222,8 @@ class Materials:
         made = self.of_plastic(plugin, values)
         widths = self.widths(plugin, values, textured=False)
         if widths["roughness"] > 0.3:
-            self.losses.add(plugin.place, "light that a rough coat takes between its facets",
-                            "a coat that keeps it")
+            self.losses.add(plugin.place, "the energy loss of a rough coat between its facets",
+                            "a coat without energy loss")
         return dataclasses.replace(made, content=made.content | {"roughness": widths["roughness"]})
 
     def of_pplastic(self, plugin, values):
@@ -331,10 +331,11 @@ class Materials:
         clear = bool(made.get("transmission_weight", 0) != 0)
         pure = 1 in (made.get("base_metalness", 0), made.get("transmission_weight", 0))
         if isinstance(rough, dict) and (not pure or "coat_weight" in made):
-            self.losses.add(plugin.place, "a texture of roughness of what is no pure metal or glass", "0.5")
+            self.losses.add(plugin.place, "a texture of roughness on a material other than pure metal or "
+                                          "glass", "0.5")
             made["specular_roughness"] = 0.5
         if aspect != 1 and (isinstance(rough, dict) or not pure):
-            self.losses.add(plugin.place, "'anisotropic' of what is no pure metal or glass", "0")
+            self.losses.add(plugin.place, "'anisotropic' on a material other than pure metal or glass", "0")
         elif aspect != 1:
             made |= renamed_widths(spectra.anisotropic(bounded**2 / aspect, bounded**2 * aspect))
         if made.get("coat_weight"):

@@ -50,7 +50,7 @@ def elements(path, name):
         parser.Parse(path.read_bytes(), True)
     except xml.parsers.expat.ExpatError as error:
         sentence = xml.parsers.expat.ErrorString(error.code)
-        refuse(Place(name, error.lineno, error.offset + 1), f"this is no XML: {sentence}")
+        refuse(Place(name, error.lineno, error.offset + 1), f"this is not XML: {sentence}")
     return stack[0].children[0]
 
 
@@ -381,7 +381,7 @@ def place_folder(place):
 def refuse_circles(plugin, within, without):
     """Refuses a plugin that contains itself. `without`: ids of plugins known to contain no circle."""
     if any(plugin is outer for outer in within):
-        refuse(plugin.place, f"{plugin} '{plugin.id}' is a part of itself")
+        refuse(plugin.place, f"{plugin} '{plugin.id}' contains itself")
     if id(plugin) in without:
         return
     for _, part in plugin.parts:

@@ -211,7 +211,7 @@ class Importer:
         start = matrices.point(matrix, found.point("from", [0, 0, 0]))
         made = matrices.point(matrix, found.point("to", [0, 0, 1])) - start
         if matrices.unit(made) is None:
-            refuse(found.place, f"{found} goes nowhere: 'from' and 'to' are the same")
+            refuse(found.place, f"'from' and 'to' of {found} are the same")
         return start, matrices.unit(made)
 
     def light_spot(self, found, matrix):

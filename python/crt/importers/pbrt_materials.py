@@ -139,7 +139,7 @@ class Materials:
         for name in ("thickness", "g"):
             found.left.discard(name)
         if self.values.reflectance(found, "albedo", 0.0) != 0:
-            self.losses.add(found.place, f"what scatters within the coat of {found}", "a clear coat")
+            self.losses.add(found.place, f"scattering within the coat of {found}", "a clear coat")
 
     def metal(self, found, prefix=""):
         if not (found.has(prefix + "eta") or found.has(prefix + "k")):

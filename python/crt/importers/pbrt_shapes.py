@@ -60,7 +60,7 @@ class Shapes:
         low, high = sorted((found.number("zmin", -radius), found.number("zmax", radius)))
         low, high = max(low / radius, -1), min(high / radius, 1)
         if low >= high:
-            refuse(found.place, "a sphere from 'zmin' to 'zmax' of which nothing is left")
+            refuse(found.place, "a sphere whose range from 'zmin' to 'zmax' is empty")
         return ball(radius, stretched, flip=reverse, low=low, high=high, phi_max=self.angle(found))
 
     def of_cylinder(self, found, reverse, stretched, sided, textured):
@@ -97,7 +97,7 @@ class Shapes:
             refuse(found.values["indices"][2], f"'indices' are whole numbers, {corners} a face, not "
                                                f"{len(indices)}")
         if len(indices) and not 0 <= indices.min() <= indices.max() < len(positions):
-            refuse(found.values["indices"][2], f"an index is none of the {len(positions)} vertices")
+            refuse(found.values["indices"][2], f"an index is not among the {len(positions)} vertices")
         if not len(indices):
             return None
         made = {"positions": positions.astype(np.float32),

@@ -155,7 +155,7 @@ class State:
         if which not in ("All", "StartTime", "EndTime"):
             refuse(place, f"ActiveTransform takes All, StartTime or EndTime, not '{which}'")
         if which == "EndTime":
-            self.losses.add(place, "motion", "things where they are at the start")
+            self.losses.add(place, "motion", "objects at their initial places")
         self.graphics.at_start = which != "EndTime"
 
     def do_TransformTimes(self, text, place):

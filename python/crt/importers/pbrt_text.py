@@ -23,7 +23,7 @@ class Text:
         try:
             self.text = read_bytes(path).decode("utf-8", "replace")
         except Damaged as error:
-            refuse(Place(str(path), 1), f"this is no scene: {error}")
+            refuse(Place(str(path), 1), f"this is not a scene: {error}")
         self._line, self._start = 1, 0  # Of the last place that was asked for.
 
     def place(self, offset):
@@ -115,7 +115,7 @@ class Text:
                 if token[1] or not np.isfinite(float(token[0])):
                     raise ValueError
             except ValueError:
-                refuse(self.place(token[2]), f"this is no finite number: '{token[0]}'")
+                refuse(self.place(token[2]), f"this is not a finite number: '{token[0]}'")
         return np.array([float(token[0]) for token in tokens])
 
     def parameters(self, kind, name, place):
@@ -175,7 +175,7 @@ class Parameters:
         if found is None or not isinstance(found[1], np.ndarray):
             return None
         if columns and len(found[1]) % columns:
-            refuse(found[2], f"'{name}' has {len(found[1])} numbers, which are no rows of {columns}")
+            refuse(found[2], f"'{name}' has {len(found[1])} numbers, which do not make rows of {columns}")
         return found[1].reshape(-1, columns) if columns else found[1]
 
     def number(self, name, default):

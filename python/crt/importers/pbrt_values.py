@@ -90,7 +90,7 @@ class Values:
             return {"illuminant": NEAREST_ILLUMINANT[name]}
         path = self.state.file(place, name)
         if not path.is_file():
-            refuse(place, f"'{name}' is no spectrum of pbrt, and '{path}' is not there")
+            refuse(place, f"'{name}' is not a spectrum of pbrt, and '{path}' does not exist")
         try:
             return spectra.table(*spectra.read_spd(path), outside)
         except (OSError, ValueError) as error:
@@ -158,7 +158,7 @@ class Values:
         if (kind, name) not in self.state.textures:
             refuse(place, f"there is no texture '{name}' of type '{kind}'" + suggestion(name, known))
         if depth > 32:
-            refuse(place, f"the texture '{name}' is made of itself")
+            refuse(place, f"the texture '{name}' contains itself")
         found = self.state.textures[kind, name]
         make = getattr(self, "tex_" + found.name, None)
         if make is None:

@@ -59,7 +59,7 @@ def read_spd(path):
         try:
             nm, value = map(float, words)
         except ValueError:
-            raise ValueError(f"line {number} is no wavelength and value: {line.strip()!r}") from None
+            raise ValueError(f"line {number} is not a wavelength with a value: {line.strip()!r}") from None
         found.append((nm, value))
     if not found:
         raise ValueError("no line has a wavelength and a value")

@@ -16,13 +16,13 @@ def arguments_of(typed):
     parser = argparse.ArgumentParser(
         prog="python -m crt report",
         description="Makes the page of a folder that 'crt converge -o DIR' or 'crt verify -o DIR' has "
-                    "written: report.html or verify.html in it. The page is one file that asks for nothing "
-                    "from outside. Exit code 2: the folder has no such files, or they are damaged.")
+                    "written: report.html or verify.html in it. The page is one file without external "
+                    "resources. Exit code 2: the folder has no such files, or they are damaged.")
     parser.add_argument("folder", metavar="DIR", type=pathlib.Path, help="the folder of the run")
     parser.add_argument("-o", "--output", metavar="FILE", type=pathlib.Path,
                         help="the page to write, instead of one in DIR")
     parser.add_argument("--figures", metavar="FOLDER", type=pathlib.Path,
-                        help="also write every figure there, as SVG files of their own")
+                        help="also write every figure there, as separate SVG files")
     return parser.parse_args(typed)
 
 
@@ -69,7 +69,7 @@ def make(folder, output=None, figures=None):
     made = [(output or folder / run.page_name, *page_of(run)) for run in runs]
     for path, html, drawn in made:
         if path.exists() and any(path.samefile(run.path) for run in runs):
-            raise Refused(f"'{path}' is what the page is made of: choose another file")
+            raise Refused(f"'{path}' is an input of the page: choose another file")
         write_whole(path, html)
         for figure in drawn if figures else ():
             write_whole(figures / f"{figure.name}.svg", figure.file)

@@ -207,8 +207,8 @@ def interval_plot(drawing, key):
 
 def calibration(scene):
     drawing = Drawing(scene, "calibration", "Can the image's own error estimate be trusted?",
-                      "1 is right; below, images understate their error. Whiskers hold 95 %.",
-                      "What images say of their own error, divided by what it is, over samples per pixel, "
+                      "1 is right; below 1, images understate their error. Whiskers hold 95 %.",
+                      "The error that images state, divided by their actual error, over samples per pixel, "
                       "with 95 % intervals. 1 is right.")
     found = [e for e in interval_plot(drawing, "predicted_over_actual_error") if e["value"] > 0]
     if not found:
@@ -344,7 +344,7 @@ def time_budget(scene):
         on_device = min(stages["render_device"] or 0, wall)
         lengths = [sum(start_seconds(stages)), wall - on_device]
         bars.append((subject["label"], lengths + ([on_device] if device else [])))
-    return stacked(scene, "time", "Where the time goes",
+    return stacked(scene, "time", "Time by stage",
                    "One replicate, from the scene file to its last sample.",
                    "Wall clock of one replicate to its last sample, stacked.",
                    parts + (["rendering, device"] if device else []), bars)
@@ -352,7 +352,7 @@ def time_budget(scene):
 
 def start_budget(scene):
     return stacked(scene, "start-up", "Start-up and writing, enlarged",
-                   "What is paid once, however many samples are taken.",
+                   "Costs that do not depend on the number of samples.",
                    "Wall clock before the first sample is there, and of writing the image, stacked.",
                    [name.replace("_", " ") for name in START_STAGES],
                    [(s["label"], start_seconds(s["stages"])) for s in scene["subjects"]])
@@ -367,7 +367,7 @@ def verdicts(scene, margin, confidence):
     if not subjects:
         return None
     drawn, figure, axes = bar_canvas(
-        scene, "verdict", "What the verdicts rest on",
+        scene, "verdict", "Evidence for the verdicts",
         "Bias of the image mean in red, green and blue at the most samples, with intervals of "
         f"{text.percent(confidence)}: PASS needs all within the dashed margin of ±{percent_tick(margin)}; "
         "one wholly outside is a FAIL.",

@@ -84,10 +84,11 @@ def deviations(cases, backend):
     if not groups:
         return None
     drawn = plots.Figure(
-        "deviations", "How far answers lie from what is expected",
-        "One mark for every figure: its relative deviation from what was expected, whatever is allowed of "
-        "it; figures estimated from samples have wide tolerances. Crosses fail, triangles cannot tell.",
-        f"Relative deviations of the figures of {backend} from what was expected, logarithmic, by group.")
+        "deviations", "Deviations from the expected results",
+        "Each mark is one figure's relative deviation from its expected value, regardless of its tolerance; "
+        "figures estimated from samples have wide tolerances. Crosses fail, triangles are inconclusive.",
+        f"Relative deviations of the figures of {backend} from their expected values, logarithmic, by "
+        f"group.")
     with plots.style():
         figure, axes = plots.canvas(0.8 + 0.37 * len(groups))
         axes.set_xscale("log")
@@ -108,6 +109,6 @@ def deviations(cases, backend):
         exponents = range(-15, math.floor(math.log10(axes.get_xlim()[1])) + 1, 3)
         plots.set_ticks(axes.xaxis, [LEFT_OF_ALL, *(10.0**e for e in exponents)],
                         lambda tick: "exact" if tick == LEFT_OF_ALL else power(tick))
-        axes.set_xlabel("relative deviation from what is expected")
+        axes.set_xlabel("relative deviation from the expected value")
         plots.spread_labels(figure, axes.xaxis)
         return plots.finish(figure, drawn)
