@@ -45,7 +45,7 @@ OptionGroup passedOn(const char* title, std::vector<Option> options, Request& to
 OptionGroup asked(Request& to) {
     const std::vector<std::string> levels{"commit", "merge", "nightly"};
     return passedOn(
-        "What is asked",
+        "Cases",
         {{.names = "--case",
           .placeholder = "NAME",
           .help = "only these: ids (A03), names (furnace), groups (H), with commas or repeated",
@@ -61,7 +61,7 @@ OptionGroup asked(Request& to) {
           .placeholder = "I/N",
           .help = "only every N-th of these cases, starting at the I-th: N runs cover all cases",
           .read = {}},
-         {.names = "--list", .placeholder = {}, .help = "show the cases and run nothing", .read = {}}},
+         {.names = "--list", .placeholder = {}, .help = "list the cases without running them", .read = {}}},
         to);
 }
 
