@@ -9,7 +9,12 @@
 #include "image/image_io.h"
 #include "png_file.h"
 
+#include <fmt/format.h>
+
+#include <fcntl.h>
+#include <sys/file.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
 #include <unistd.h>
 #include <cmath>
 #include <cstdlib>
@@ -384,6 +389,30 @@ TEST_CASE("a folder that a command fills is made, and none above it", "[image_io
     } catch (const Error& error) {
         CHECK(error.kind() == ErrorKind::Output);
     }
+}
+
+TEST_CASE("temporaries of killed processes are removed, and no others", "[image_io]") {
+    const TemporaryFolder directory;
+    const pid_t ended = ::fork();
+    if (ended == 0) ::_exit(0);
+    REQUIRE(::waitpid(ended, nullptr, 0) == ended);
+    const auto temporary = [&](pid_t process, int attempt) {
+        const std::string path = directory / fmt::format("image.exr.{}-{}.tmp", process, attempt);
+        spit(path, "x");
+        return path;
+    };
+    const std::string left = temporary(ended, 0), locked = temporary(ended, 1),
+                      own = temporary(::getpid(), 0);
+    const std::string notes = directory / "image.exr.notes.tmp", other = directory / "image.exr2.1-0.tmp",
+                      longer = left + ".txt";
+    for (const std::string& path : {notes, other, longer}) spit(path, "x");
+    // As a process on another machine holds it, which this one cannot see.
+    const int descriptor = ::open(locked.c_str(), O_RDWR | O_CLOEXEC);
+    REQUIRE(::flock(descriptor, LOCK_EX | LOCK_NB) == 0);
+    checkWritable(directory / "image.exr");
+    ::close(descriptor);
+    CHECK_FALSE(fs::exists(left));
+    for (const std::string& path : {locked, own, notes, other, longer}) CHECK(fs::exists(path));
 }
 
 TEST_CASE("unwritable outputs are found before anything is rendered", "[image_io]") {

@@ -8,11 +8,14 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <fcntl.h>
 #include <filesystem>
+#include <optional>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <system_error>
 #include <unistd.h>
@@ -98,6 +101,38 @@ std::string temporaryBeside(const std::string& file, int attempt) {
     return file.substr(0, std::min(file.size(), name + kLongestName - end.size())) + end;
 }
 
+/// The process that temporaryBeside() named `entry` for, if it is a temporary of `name`.
+std::optional<pid_t> writerOf(const std::string& entry, const std::string& name) {
+    pid_t process = 0;
+    int attempt = 0, end = 0;
+    if (entry.compare(0, name.size(), name) != 0 ||
+        std::sscanf(entry.c_str() + name.size(), ".%d-%d.tmp%n", &process, &attempt, &end) != 2 ||
+        end == 0 || name.size() + static_cast<std::size_t>(end) != entry.size())
+        return std::nullopt;
+    return process;
+}
+
+/// True if no process writes to the file: its process has ended, and no machine holds its lock.
+bool isAbandoned(const fs::path& file, pid_t process) {
+    if (::kill(process, 0) == 0 || errno != ESRCH) return false;
+    const int descriptor = ::open(file.c_str(), O_RDWR | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
+    if (descriptor < 0) return false;
+    const bool free = ::flock(descriptor, LOCK_EX | LOCK_NB) == 0;
+    ::close(descriptor);
+    return free;
+}
+
+/// Removes the temporaries of `file` whose processes were killed. They would stay for ever.
+void removeAbandoned(const std::string& file) {
+    const std::string name = fs::path(file).filename().string();
+    std::error_code error;
+    for (fs::directory_iterator entry(directoryOf(file), error), end; !error && entry != end;
+         entry.increment(error))
+        if (const auto process = writerOf(entry->path().filename().string(), name);
+            process && isAbandoned(entry->path(), *process))
+            ::unlink(entry->path().c_str());
+}
+
 }  // namespace
 
 AtomicFile::AtomicFile(const std::string& path) : path_(path), final_(path) {
@@ -119,6 +154,7 @@ AtomicFile::AtomicFile(const std::string& path) : path_(path), final_(path) {
         temporary_ = temporaryBeside(final_, attempt);
         descriptor_ = ::open(temporary_.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
         const int error_number = errno;
+        if (descriptor_ >= 0) ::flock(descriptor_, LOCK_EX | LOCK_NB);  // See removeAbandoned().
         if (descriptor_ >= 0 || error_number == EINTR || (error_number == EEXIST && attempt < 1000))
             continue;
         if (error_number == ENOENT && final_ != path_)
@@ -230,6 +266,7 @@ void checkWritable(const std::string& path) {
     if (!fs::exists(directory, error)) refuse(path, missingFolder(directory));
     if (!fs::is_directory(directory, error)) refuse(path, fmt::format("'{}' is not a directory", directory));
     const AtomicFile probe(path);  // Removed again by its destructor.
+    removeAbandoned(targetOf(path));
 }
 
 void makeOutputFolder(const std::string& path) {
