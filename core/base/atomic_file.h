@@ -48,7 +48,8 @@ private:
 /// Finds out before a render, rather than after it, that `path` cannot be written: creates and removes a
 /// temporary file beside it. Removes temporaries of the same file that killed processes left. Makes no
 /// folder, which would hide a typing error. Throws crt::Error(Output) with one sentence. The only later
-/// error is a full disk. Standard output that is a terminal is refused: it would show an image's bytes as text.
+/// error is a full disk. Standard output that is a terminal is refused: it would show an image's bytes as
+/// text.
 void checkWritable(const std::string& path);
 
 /// Makes the folder that a command fills, in one that is there already. Throws crt::Error(Output).
