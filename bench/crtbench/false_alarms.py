@@ -49,11 +49,11 @@ def measure(program, arguments):
         results.paragraph("None.")
     results.claim(
         "How often `crt converge` is wrong where the truth is known",
-        f"{repeats} repeats of each situation: progressive means of normal samples, pixel by pixel, of "
-        f"known "
-        "variance, bias and cost, which go through the same analysis as renders. *Stated*: the share that "
-        "may "
-        "be wrong. The last column names situations that exceed it by more than three standard errors.",
+        f"{repeats} repeats of each situation: progressive means of samples, pixel by pixel, of known "
+        "variance, bias and cost, which go through the same analysis as renders. Samples are normal, or rare "
+        "bright paths (*fireflies*). *Stated*: the share that may be wrong. The last column names situations "
+        "that exceed it by more than three standard errors, and of how many statements: crt makes no "
+        "statement where the noise hides it.",
         ["statement", "situations", "least wrong", "most wrong", "stated", "more often wrong than stated"],
         [
             by_statement([row for row in rows if row["statement"] == statement])
@@ -68,7 +68,7 @@ def measure(program, arguments):
 def by_statement(rows):
     """One line for all situations in which a statement is made."""
     shares = [row["wrong"] / row["asked"] for row in rows]
-    worse = ", ".join(f"{row['situation']} ({share(row)})" for row in rows if excess(row))
+    worse = ", ".join(f"{row['situation']} ({share(row)} of {row['asked']})" for row in rows if excess(row))
     return [rows[0]["statement"], len(rows), f"{min(shares):.2%}", f"{max(shares):.2%}",
             f"{rows[0]['stated']:.1%}", worse or "none"]
 
