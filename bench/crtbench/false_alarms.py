@@ -50,10 +50,10 @@ def measure(program, arguments):
     results.claim(
         "How often `crt converge` is wrong where the truth is known",
         f"{repeats} repeats of each situation: progressive means of samples, pixel by pixel, of known "
-        "variance, bias and cost, which go through the same analysis as renders. Samples are normal, or rare "
-        "bright paths (*fireflies*). *Stated*: the share that may be wrong. The last column names situations "
-        "that exceed it by more than three standard errors, and of how many statements: crt makes no "
-        "statement where the noise hides it.",
+        "variance, bias and cost, which go through the same analysis as renders. Samples are normal, or "
+        "rare bright paths (*fireflies*). *Stated*: the share that may be wrong. The last column names "
+        "situations that exceed it by more than three standard errors, and of how many statements: crt "
+        "makes no statement where the noise hides it.",
         ["statement", "situations", "least wrong", "most wrong", "stated", "more often wrong than stated"],
         [
             by_statement([row for row in rows if row["statement"] == statement])
