@@ -73,50 +73,45 @@ OptionGroup ofWhom(Request& to) {
                       .help = "look for the backend here first",
                       .read = {},
                       .completion = {Completion::Kind::Folder}},
-                     deviceOption(to.integrator), threadsOption(to.integrator)},
+                     deviceOption(to.integrator),
+                     threadsOption(to.integrator)},
                     to);
 }
 
 OptionGroup output(Request& to) {
-    return passedOn("Output",
-                    {{.names = "-o,--output",
-                      .placeholder = "DIR",
-                      .help = "write verify.json there, and its page, verify.html (by Python)",
-                      .read = {},
-                      .completion = {Completion::Kind::Folder}},
-                     {.names = "-q,--quiet",
-                      .placeholder = {},
-                      .help = "only what fails, and the summary",
-                      .read = {}},
-                     {.names = "--markdown",
-                      .placeholder = {},
-                      .help = "print docs/stability.md instead",
-                      .read = {}},
-                     {.names = "--figures",
-                      .placeholder = "FILE",
-                      .help = "with --markdown: a verify.json whose figures go into it; repeatable",
-                      .read = {},
-                      .completion = completeFile({"json"}),
-                      .repeatable = true}},
-                    to);
+    return passedOn(
+        "Output",
+        {{.names = "-o,--output",
+          .placeholder = "DIR",
+          .help = "write verify.json there, and its page, verify.html (by Python)",
+          .read = {},
+          .completion = {Completion::Kind::Folder}},
+         {.names = "-q,--quiet", .placeholder = {}, .help = "only what fails, and the summary", .read = {}},
+         {.names = "--markdown", .placeholder = {}, .help = "print docs/stability.md instead", .read = {}},
+         {.names = "--figures",
+          .placeholder = "FILE",
+          .help = "with --markdown: a verify.json whose figures go into it; repeatable",
+          .read = {},
+          .completion = completeFile({"json"}),
+          .repeatable = true}},
+        to);
 }
 
 constexpr const char* kVerifyNotes =
-            "\nThe suite asks a backend what physics, geometry and arithmetic demand: closed forms, "
-            "deterministic quadrature, relations between\n"
-            "images. A case passes, does not apply (and says why), is "
-            "INCONCLUSIVE (the noise hides the answer) or\n"
-            "FAILS; the last two make the exit code 7, and the line below says what the figures suggest. "
-            "docs/stability.md describes every case.\n"
-            "\nExamples:\n"
-            "  crt verify                                          the level for every commit, on the best "
-            "backend\n"
-            "  crt verify --backend opencl --level merge -o out    minutes of it, with out/verify.json and "
-            "out/verify.html\n"
-            "  crt verify --case furnace,A03,H                     two cases and a whole group\n"
-            "  crt verify --backend mine --plugin-path build       a backend of your own\n"
-            "  crt verify --list --level nightly                   everything there is\n";
-
+    "\nThe suite asks a backend what physics, geometry and arithmetic demand: closed forms, "
+    "deterministic quadrature, relations between\n"
+    "images. A case passes, does not apply (and says why), is "
+    "INCONCLUSIVE (the noise hides the answer) or\n"
+    "FAILS; the last two make the exit code 7, and the line below says what the figures suggest. "
+    "docs/stability.md describes every case.\n"
+    "\nExamples:\n"
+    "  crt verify                                          the level for every commit, on the best "
+    "backend\n"
+    "  crt verify --backend opencl --level merge -o out    minutes of it, with out/verify.json and "
+    "out/verify.html\n"
+    "  crt verify --case furnace,A03,H                     two cases and a whole group\n"
+    "  crt verify --backend mine --plugin-path build       a backend of your own\n"
+    "  crt verify --list --level nightly                   everything there is\n";
 
 constexpr const char* kSuite = "crt_conformance";
 
