@@ -31,17 +31,17 @@ namespace crt::verify {
 namespace {
 
 struct Arguments {
-    std::string backend = "auto";          ///< A name, a path of a plugin, or "auto".
-    std::string plugin_path;               ///< A directory to look for it first; empty: none.
+    std::string backend = "auto";  ///< A name, a path of a plugin, or "auto".
+    std::string plugin_path;       ///< A directory to look for it first; empty: none.
     IntegratorOptions integrator;
     std::vector<std::string>
         cases;  ///< Ids, names or groups, also several with commas; empty: all of the level.
     Level level = Level::Commit;
-    std::size_t part = 1, parts = 1;       ///< Every `parts`-th of the cases, from number `part` on.
-    std::string output;                    ///< Directory for verify.json and its page; empty: none.
+    std::size_t part = 1, parts = 1;  ///< Every `parts`-th of the cases, from number `part` on.
+    std::string output;               ///< Directory for verify.json and its page; empty: none.
     bool list = false;
-    bool markdown = false;                 ///< Print docs/stability.md with the figures of `suites` instead.
-    std::vector<std::string> suites;       ///< verify.json files.
+    bool markdown = false;            ///< Print docs/stability.md with the figures of `suites` instead.
+    std::vector<std::string> suites;  ///< verify.json files.
     bool quiet = false;
 };
 

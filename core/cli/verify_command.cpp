@@ -59,7 +59,7 @@ OptionGroup asked(Request& to) {
           .choices = levels},
          {.names = "--part",
           .placeholder = "I/N",
-          .help = "only every N-th of these cases, starting at the I-th: N runs cover all cases",
+          .help = "only every N-th of these cases, from the I-th on: N runs ask them all",
           .read = {}},
          {.names = "--list", .placeholder = {}, .help = "list the cases without running them", .read = {}}},
         to);
@@ -73,50 +73,45 @@ OptionGroup ofWhom(Request& to) {
                       .help = "search for the backend here first",
                       .read = {},
                       .completion = {Completion::Kind::Folder}},
-                     deviceOption(to.integrator), threadsOption(to.integrator)},
+                     deviceOption(to.integrator),
+                     threadsOption(to.integrator)},
                     to);
 }
 
 OptionGroup output(Request& to) {
-    return passedOn("Output",
-                    {{.names = "-o,--output",
-                      .placeholder = "DIR",
-                      .help = "write verify.json and the page verify.html (made by Python) there",
-                      .read = {},
-                      .completion = {Completion::Kind::Folder}},
-                     {.names = "-q,--quiet",
-                      .placeholder = {},
-                      .help = "print only failures and the summary",
-                      .read = {}},
-                     {.names = "--markdown",
-                      .placeholder = {},
-                      .help = "print docs/stability.md instead",
-                      .read = {}},
-                     {.names = "--figures",
-                      .placeholder = "FILE",
-                      .help = "with --markdown: a verify.json whose numbers to include; repeatable",
-                      .read = {},
-                      .completion = completeFile({"json"}),
-                      .repeatable = true}},
-                    to);
+    return passedOn(
+        "Output",
+        {{.names = "-o,--output",
+          .placeholder = "DIR",
+          .help = "write verify.json there, and its page, verify.html (by Python)",
+          .read = {},
+          .completion = {Completion::Kind::Folder}},
+         {.names = "-q,--quiet", .placeholder = {}, .help = "only what fails, and the summary", .read = {}},
+         {.names = "--markdown", .placeholder = {}, .help = "print docs/stability.md instead", .read = {}},
+         {.names = "--figures",
+          .placeholder = "FILE",
+          .help = "with --markdown: a verify.json whose figures go into it; repeatable",
+          .read = {},
+          .completion = completeFile({"json"}),
+          .repeatable = true}},
+        to);
 }
 
 constexpr const char* kVerifyNotes =
-            "\nThe suite checks a backend against physics, geometry and arithmetic: closed forms, "
-            "deterministic quadrature, relations between\n"
-            "images. A case passes, does not apply (and says why), is "
-            "INCONCLUSIVE (the noise hides the answer) or\n"
-            "FAILS; the last two make the exit code 7, and the line below says what the figures suggest. "
-            "docs/stability.md describes every case.\n"
-            "\nExamples:\n"
-            "  crt verify                                          the level for every commit, on the best "
-            "backend\n"
-            "  crt verify --backend opencl --level merge -o out    a few minutes, with out/verify.json and "
-            "out/verify.html\n"
-            "  crt verify --case furnace,A03,H                     two cases and a whole group\n"
-            "  crt verify --backend mine --plugin-path build       a backend of your own\n"
-            "  crt verify --list --level nightly                   all cases\n";
-
+    "\nThe suite asks a backend what physics, geometry and arithmetic demand: closed forms, "
+    "deterministic quadrature, relations between\n"
+    "images. A case passes, does not apply (with the reason), is "
+    "INCONCLUSIVE (the noise is too large) or\n"
+    "FAILS; the last two make the exit code 7, and the line below suggests a cause. "
+    "docs/stability.md describes every case.\n"
+    "\nExamples:\n"
+    "  crt verify                                          the level for every commit, on the best "
+    "backend\n"
+    "  crt verify --backend opencl --level merge -o out    minutes of it, with out/verify.json and "
+    "out/verify.html\n"
+    "  crt verify --case furnace,A03,H                     two cases and a whole group\n"
+    "  crt verify --backend mine --plugin-path build       a backend of your own\n"
+    "  crt verify --list --level nightly                   everything there is\n";
 
 constexpr const char* kSuite = "crt_conformance";
 
@@ -143,7 +138,7 @@ constexpr const char* kSuite = "crt_conformance";
 Command verifyCommand() {
     const auto to = std::make_shared<Request>();
     return {.name = "verify",
-            .summary = "render scenes with known results; exit code 7 if a backend does not reproduce them",
+            .summary = "render scenes whose answer is known; exit code 7 when a backend does not find it",
             .groups = {asked(*to), ofWhom(*to), output(*to)},
             .notes = kVerifyNotes,
             .run = [to](const std::string&) -> int { becomeSuite(to->words); }};
