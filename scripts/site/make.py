@@ -40,6 +40,9 @@ def package(build, work):
     shutil.copytree(ROOT / "python/crt", folder, ignore=shutil.ignore_patterns("__pycache__"))
     for module in (build / "python/crt").glob("_crt*"):
         (folder / module.name).symlink_to(module.resolve())
+    libraries = work / "lib"  # The module looks for libcrt two folders above itself.
+    libraries.unlink(missing_ok=True)
+    libraries.symlink_to((build / "lib").resolve())
     if not any(folder.glob("_crt*.so")):
         sys.exit(f"== error: there is no Python module in {build}/python/crt; scripts/build makes it")
     return folder.parent
