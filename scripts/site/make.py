@@ -153,6 +153,8 @@ def navigation(site, decisions):
         return [f"{folder}/index.md"] + sorted(path.relative_to(site.docs).as_posix() for path in
                                                (site.docs / folder).glob("*.md") if path.name != "index.md")
 
+    index = (ROOT / "docs/results/README.md").read_text("utf-8")
+    results = ["results/index.md", *(f"results/{name}" for name in re.findall(r"\]\(([\w-]+\.md)\)", index))]
     titled = [{title(file.read_text("utf-8")).replace(": ", " ", 1): f"decisions/{file.name}"}
               for file in decisions]
     return [{"crt": ["index.md"]}, {"Gallery": "gallery.md"},
@@ -166,7 +168,7 @@ def navigation(site, decisions):
             {"API": [{"Python": "python-api.md"}, {"C and C++": "cpp.md"}]},
             {"Design": [{"Tour": "tour.md"}, {"Architecture": "architecture.md"},
                         {"Known answers": "stability.md"}, {"Decisions": ["decisions/index.md", *titled]}]},
-            {"Results": pages("results")},
+            {"Results": results},
             {"Taking part": [{"How to": "contributing.md"}, {"Measuring": "bench.md"},
                              {"Changes": "changelog.md"}]}]
 
