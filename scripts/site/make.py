@@ -40,6 +40,9 @@ def package(build, work):
     shutil.copytree(ROOT / "python/crt", folder, ignore=shutil.ignore_patterns("__pycache__"))
     for module in (build / "python/crt").glob("_crt*"):
         (folder / module.name).symlink_to(module.resolve())
+    libraries = work / "lib"  # The module looks for libcrt two folders above itself.
+    libraries.unlink(missing_ok=True)
+    libraries.symlink_to((build / "lib").resolve())
     if not any(folder.glob("_crt*.so")):
         sys.exit(f"== error: there is no Python module in {build}/python/crt; scripts/build makes it")
     return folder.parent
@@ -150,6 +153,8 @@ def navigation(site, decisions):
         return [f"{folder}/index.md"] + sorted(path.relative_to(site.docs).as_posix() for path in
                                                (site.docs / folder).glob("*.md") if path.name != "index.md")
 
+    index = (ROOT / "docs/results/README.md").read_text("utf-8")
+    results = ["results/index.md", *(f"results/{name}" for name in re.findall(r"\]\(([\w-]+\.md)\)", index))]
     titled = [{title(file.read_text("utf-8")).replace(": ", " ", 1): f"decisions/{file.name}"}
               for file in decisions]
     return [{"crt": ["index.md"]}, {"Gallery": "gallery.md"},
@@ -163,7 +168,7 @@ def navigation(site, decisions):
             {"API": [{"Python": "python-api.md"}, {"C and C++": "cpp.md"}]},
             {"Design": [{"Tour": "tour.md"}, {"Architecture": "architecture.md"},
                         {"Known answers": "stability.md"}, {"Decisions": ["decisions/index.md", *titled]}]},
-            {"Results": pages("results")},
+            {"Results": results},
             {"Taking part": [{"How to": "contributing.md"}, {"Measuring": "bench.md"},
                              {"Changes": "changelog.md"}]}]
 

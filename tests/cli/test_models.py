@@ -194,7 +194,7 @@ class Meshes(CliTest):
 
 class CornellBox(CliTest):
     """The reference is what Mitsuba 3 gave in wavelengths when bench/run mtl-agreement was last run
-    (docs/results/files.md)."""
+    (out/bench/mtl-agreement.json)."""
 
     SIZE = 128
 
