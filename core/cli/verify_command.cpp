@@ -83,14 +83,14 @@ OptionGroup output(Request& to) {
         "Output",
         {{.names = "-o,--output",
           .placeholder = "DIR",
-          .help = "write verify.json there, and its page, verify.html (by Python)",
+          .help = "write verify.json and the page verify.html (made by Python) there",
           .read = {},
           .completion = {Completion::Kind::Folder}},
-         {.names = "-q,--quiet", .placeholder = {}, .help = "only what fails, and the summary", .read = {}},
+         {.names = "-q,--quiet", .placeholder = {}, .help = "print only failures and the summary", .read = {}},
          {.names = "--markdown", .placeholder = {}, .help = "print docs/stability.md instead", .read = {}},
          {.names = "--figures",
           .placeholder = "FILE",
-          .help = "with --markdown: a verify.json whose figures go into it; repeatable",
+          .help = "with --markdown: a verify.json whose numbers to include; repeatable",
           .read = {},
           .completion = completeFile({"json"}),
           .repeatable = true}},
@@ -98,7 +98,7 @@ OptionGroup output(Request& to) {
 }
 
 constexpr const char* kVerifyNotes =
-    "\nThe suite asks a backend what physics, geometry and arithmetic demand: closed forms, "
+    "\nThe suite checks a backend against physics, geometry and arithmetic: closed forms, "
     "deterministic quadrature, relations between\n"
     "images. A case passes, does not apply (with the reason), is "
     "INCONCLUSIVE (the noise is too large) or\n"
@@ -107,11 +107,11 @@ constexpr const char* kVerifyNotes =
     "\nExamples:\n"
     "  crt verify                                          the level for every commit, on the best "
     "backend\n"
-    "  crt verify --backend opencl --level merge -o out    minutes of it, with out/verify.json and "
+    "  crt verify --backend opencl --level merge -o out    a few minutes, with out/verify.json and "
     "out/verify.html\n"
     "  crt verify --case furnace,A03,H                     two cases and a whole group\n"
-    "  crt verify --backend mine --plugin-path build       a backend of your own\n"
-    "  crt verify --list --level nightly                   everything there is\n";
+    "  crt verify --backend mine --plugin-path build       your own backend\n"
+    "  crt verify --list --level nightly                   all cases\n";
 
 constexpr const char* kSuite = "crt_conformance";
 
