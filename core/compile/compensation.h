@@ -1,4 +1,4 @@
-/// What rough surfaces give back of the light that their microfacets lose (kernel/compensation.h): tables of
+/// Compensates rough surfaces for the energy loss of their microfacets (kernel/compensation.h): tables of
 /// the losses, worked out before rendering.
 #pragma once
 

@@ -46,7 +46,7 @@ std::size_t smoothTrianglesOf(const FlatScene& flat) {
     return smooth;
 }
 
-/// How many records of a kind the scene and its meshes have: one for each primitive, or none.
+/// Number of records of a kind of the scene and its meshes: one for each primitive, or none.
 template <class T>
 std::size_t recordsOf(const FlatScene& flat, std::vector<T> FlatScene::*member) {
     std::size_t records = (flat.*member).size();
@@ -54,7 +54,7 @@ std::size_t recordsOf(const FlatScene& flat, std::vector<T> FlatScene::*member) 
     return records;
 }
 
-/// What the scene and its meshes have for each primitive.
+/// Records of the scene and its meshes for each primitive.
 template <class T>
 kernel::CrtSpan appendOfPrimitives(BlobWriter& blob, const FlatScene& flat,
                                    std::vector<T> FlatScene::*member) {
@@ -115,7 +115,7 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
     header.accelerator = accelerator.kind;
     MeshTrees trees = compileMeshTrees(flat);
     header.nodes = blob.append(accelerator.nodes);
-    accelerator.nodes = {};  // nobody asks for them again, and they may be hundreds of megabytes
+    accelerator.nodes = {};  // they are not needed again, and they may be hundreds of megabytes
     const std::size_t count = flat.triangles.size();
     header.triangle_count = static_cast<std::uint32_t>(count);
     const std::size_t primitive_count = primitivesOf(flat), slots = primitive_count + flat.instances.size();

@@ -1,4 +1,5 @@
-/// What a kernel needs for a scene, as bits of kernel/features.h, and what it can leave out and why.
+/// The features that a kernel needs for a scene, as bits of kernel/features.h, and those that it can leave
+/// out, with reasons.
 #pragma once
 
 #include "compile/materials.h"
@@ -16,7 +17,7 @@ namespace crt {
 /// `header` is complete but for its features.
 std::uint64_t featuresOf(const Scene& scene, const kernel::CrtScene& header, const MaterialPart& materials);
 
-/// What is left out, and why.
+/// A feature that is left out, and the reason.
 using LeftOut = std::vector<std::pair<std::string, std::string>>;
 /// `header` is complete. `occluders`: triangles that shadow rays are tested against by the brute-force loop.
 LeftOut leftOut(const Scene& scene, const kernel::CrtScene& header, std::size_t occluders,

@@ -82,7 +82,7 @@ void ObjectReader::checkInsides(std::int32_t whole, const YamlPlace& place) cons
         }
 }
 
-/// Of what an openpbr material is mixed of, too, which has no names.
+/// Also of the unnamed parts of an openpbr material.
 bool ObjectReader::transmits(const Material& part) const {
     const auto index = static_cast<std::int32_t>(&part - scene_.materials.data());
     if (part.type != MaterialType::Mix || parts_.contains(index)) return part.transmits();

@@ -160,7 +160,7 @@ Json sectionSchema(const SectionSchema& section) {
 
 // ---- Markdown -------------------------------------------------------------------------------------------
 
-/// What stands before the sections of the manual.
+/// The text before the sections of the manual.
 constexpr std::string_view kIntroduction = R"(# Scene files
 
 <!-- Generated from the table in core/scene/yaml/scene_schema.cpp. Change it there, then run
@@ -268,7 +268,7 @@ Further families are folders of CSV files (`FAMILY/NAME.csv`, with the header th
 in a folder of `CRT_DATA_PATH`, whose folders, separated by `:`, are searched before those of crt.
 )";
 
-/// What stands before the variants of a family.
+/// The text before the variants of a family.
 std::string_view familyIntroduction(std::string_view family) {
     if (family == "spectrum")
         return "A function of wavelength, from 360 to 830 nm. A key that needs a spectrum takes\n\n"
@@ -352,7 +352,7 @@ std::string keyTable(const SectionSchema& section) {
     return text;
 }
 
-/// What becomes of each keyword of an MTL, from the table that its reader uses.
+/// The meaning of each keyword of an MTL, from the table that its reader uses.
 std::string mtlTable() {
     std::string text =
         "\nMaterials of an OBJ come from the files that its `mtllib` names: all of them are read, and the "

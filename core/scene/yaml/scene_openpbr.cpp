@@ -1,5 +1,5 @@
 // The part of ObjectReader that reads openpbr materials (OpenPBR Surface 1.1): they become crt's own, mixed
-// as the specification says. What crt has not is refused where it would be seen.
+// as the specification says. Features that crt lacks are refused where they would be visible.
 #include "scene/light_units.h"
 #include "scene/yaml/scene_objects.h"
 
@@ -49,11 +49,11 @@ bool isWhite(const Spectrum& s) { return s.min() == 1 && s.max() == 1; }
 
 }  // namespace
 
-/// What the keys say, and materials made of it.
+/// The values of the keys, and the materials made of them.
 struct ObjectReader::OpenPbr {
     ObjectReader& reader;
     const SectionReader& section;
-    Material like;  ///< What all its parts have in common.
+    Material like;  ///< Properties that all its parts share.
     double base_weight = 1, diffuse_roughness = 0;
     Spectrum base_color = constantSpectrum(0.8), specular_color = constantSpectrum(1);
     TextureIndex base_texture = kNoTexture;
@@ -239,7 +239,7 @@ void ObjectReader::OpenPbr::setColor(Material& part) const {
     part.reflectance = scaled(base_color, base_weight);
 }
 
-/// What is seen through a rough coat is seen through it twice.
+/// Light passes a rough coat twice, in and out.
 void ObjectReader::OpenPbr::setRoughness(Material& part, bool coated) const {
     part.roughness = roughness.value;
     part.roughness_texture = roughness.texture;

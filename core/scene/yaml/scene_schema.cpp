@@ -44,7 +44,7 @@ KeySchema outsideKey() {
                    "wavelength alone is refused, because it has no width."};
 }
 
-/// What shines in a scene: lamps and the environment.
+/// Light sources of a scene: emitters and the environment.
 KeySchema radianceKey(std::string doc) {
     return {.name = "radiance",
             .kind = Kind::Spectrum,

@@ -68,7 +68,7 @@ KeySchema degreesKey(std::string name, ValueRange range, double fallback, std::s
             .doc = std::move(doc)};
 }
 
-/// What sends light from a point, and of `beam` what a figure of intensity means.
+/// Emission from a point, and for `beam` the meaning of an intensity.
 std::vector<KeySchema> intensityKeys(const std::string& beam) {
     return {spectralKey("radiant_intensity", "W·sr⁻¹·nm⁻¹", "Radiant intensity" + beam + "."),
             amountKey("power_w", "W", "Radiant flux in all directions, from 360 to 830 nm."),

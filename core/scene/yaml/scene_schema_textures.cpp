@@ -11,7 +11,7 @@ using namespace schema;
 
 constexpr ValueRange kTurns{-kMostUv, kMostUv, false, false};
 
-/// What texture coordinates go through, whatever they pick.
+/// Transforms of texture coordinates, for all textures.
 std::vector<KeySchema> transformKeys() {
     return {{.name = "scale",
              .kind = Kind::Number,

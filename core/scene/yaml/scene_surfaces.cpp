@@ -1,4 +1,4 @@
-// What materials have besides their values (scene_objects.h): anisotropy.
+// Properties of materials besides their values (scene_objects.h): anisotropy.
 #include "scene/yaml/scene_objects.h"
 
 namespace crt {
