@@ -464,7 +464,7 @@ std::uint32_t texelType(const ImageSpec& spec) {
 
 enum class Part { Color, Alpha };
 
-/// Where the pixels of a file lie in its picture: an EXR's data window may be smaller or larger than its
+/// The rectangle of a file's pixels in its image: an EXR's data window may be smaller or larger than its
 /// display window.
 struct Placement {
     explicit Placement(const ImageSpec& spec)

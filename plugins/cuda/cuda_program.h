@@ -1,5 +1,5 @@
 /// From what a scene needs to kernels that can be launched: the precompiled one at once, and the lean ones
-/// from the disk cache or, compiled by processes of their own, as soon as all are ready. They give the same
+/// from the disk cache or, compiled by separate processes, as soon as all are ready. They give the same
 /// bits, so a render may go over from one to the other between launches.
 #pragma once
 
@@ -26,17 +26,17 @@ constexpr std::uint32_t kBlock = 128, kBlockWidth = 16, kBlockHeight = 8;
 /// Pairs of ray counters, as in kernels.cu.
 constexpr std::uint32_t kRayCounters = 1024;
 
-/// Whether it has the stacks of a tree's traversal.
+/// True if it has the stacks of a tree's traversal.
 bool traverses(const KernelSpec& spec);
 
 /// The whole text that NVRTC compiles: the host's text of kernel/wavefront.h, then kernels.cu.
 std::string kernelText(const std::string& wavefront_text);
 
-/// How many blocks a multiprocessor should hold at once, in the order of trying: more hide latency better,
-/// but leave each thread fewer registers. The first that spills at most kSpillBytesAllowed wins; the last is
-/// not judged. A few spilled values cost less than a fourth block gains (docs/results/cuda.md); a fifth
-/// gains where there is no tree to traverse (docs/decisions/0041-instruction-cache.md); a kernel that only
-/// traces is best with seven (docs/decisions/0042-wavefront.md).
+/// Numbers of blocks that a multiprocessor should hold at once, in the order of trying: more hide latency
+/// better, but leave each thread fewer registers. The first that spills at most kSpillBytesAllowed wins; the
+/// last is not judged. A few spilled values cost less than a fourth block gains (docs/results/cuda.md); a
+/// fifth gains where there is no tree to traverse (docs/decisions/0041-instruction-cache.md); a kernel that
+/// only traces is best with seven (docs/decisions/0042-wavefront.md).
 std::vector<int> blocksPerMultiprocessor(const KernelSpec& spec);
 /// Of all stores and loads in the code of a kernel.
 constexpr std::uint32_t kSpillBytesAllowed = 128;
@@ -50,7 +50,7 @@ std::vector<std::string> nvrtcOptions(int arch, const KernelSpec& spec, int bloc
 plugin::KernelCache::Key cacheKey(const std::string& text, int arch, const KernelSpec& spec,
                                   const std::string& compiler, const std::string& driver_version);
 
-/// What a kernel takes on the device, as the assembler reports it (--ptxas-options=-v).
+/// Resources of a kernel on the device, as the assembler reports them (--ptxas-options=-v).
 struct ResourceUse {
     std::uint32_t registers = 0;
     std::uint32_t stack_bytes = 0;  ///< Per thread; includes what is spilled.
@@ -106,7 +106,7 @@ public:
     CudaProgram& operator=(const CudaProgram&) = delete;
 
     /// The kernels to be launched by now: those wanted, in their order, once all are there; before that, and
-    /// where they cannot be had, the precompiled crt_render alone.
+    /// if they are not available, the precompiled crt_render alone.
     const std::vector<Module>& current();
 
     /// Goes on with the precompiled kernel, which gives the same image.
@@ -115,10 +115,10 @@ public:
     const std::vector<KernelSpec>& wanted() const { return wanted_; }
     /// All lean kernels came from the disk cache.
     bool fromCache() const { return from_cache_; }
-    /// What the compilers took, added up.
+    /// Times of the compilers, added up.
     double compileSeconds() const { return compile_seconds_; }
     double cacheSeconds() const { return cache_seconds_; }
-    /// Which kernels ran: "precompiled, then NVRTC 13.0 sm_90".
+    /// The kernels that ran: "precompiled, then NVRTC 13.0 sm_90".
     std::string description() const;
 
 private:

@@ -1,6 +1,6 @@
 /// Rays through a Tree, eight boxes or triangles at a time. Boxes cull, conservatively, as those of
-/// kernel/boxes.h do; triangles are tested by the operations of crt_intersect_corners, each in a lane of its
-/// own, so that hits are the same bits as on every other backend.
+/// kernel/boxes.h do; triangles are tested by the operations of crt_intersect_corners, each in a separate
+/// lane, so that hits are the same bits as on every other backend.
 #pragma once
 
 #include "embree_tree.h"
@@ -74,7 +74,7 @@ inline u32 hitsOf(const Leaf8& leaf, const CrtShear& ray, f32 limit, Hits8* hits
     return lanes;
 }
 
-/// What is left to be visited, and where the ray enters it.
+/// A node to visit, and the distance at which the ray enters it.
 struct Stacked {
     Child child;
     f32 enter;

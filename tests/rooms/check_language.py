@@ -23,7 +23,7 @@ PAGES = ("README.md", "CONTRIBUTING.md")
 SEEN = ("core", "plugins", "python/crt", "python/src")
 # Folders with a separate bound, which may only fall.
 LATER = {"core/kernel": 113, "core/judge/verify": 65, "docs/results": 69}
-COMMENTS = 577
+COMMENTS = 328
 # The rules quote what they forbid.
 QUOTES = {"CONTRIBUTING.md", "tests/rooms/check_language.py", "tests/rooms/test_language.py"}
 

@@ -101,7 +101,7 @@ void Contestant::describe(const CompiledScene& compiled) {
     tests_ = stats::Replicates(compiled.width, compiled.height, 3);
 }
 
-/// What a film amounts to after so many samples.
+/// Measures a film after this number of samples.
 Row Contestant::look(const Film& film, std::uint32_t replicate, bool last) {
     Row row;
     row.key = configuration_.key;
@@ -169,8 +169,8 @@ void Contestant::renderPicture(std::uint32_t replicate, std::uint64_t samples) {
     keepPicture(film, image, stats::meanLuminance(looks_.at(samples).at(replicate)));
 }
 
-/// What only the very first sample pays, such as an OpenCL driver that makes machine code late, belongs to
-/// the start and not to a replicate.
+/// Costs of the very first sample, such as an OpenCL driver that makes machine code late, belong to the
+/// start and not to a replicate.
 void Contestant::warmUp(const CompiledScene& compiled) {
     const Clock::time_point start = Clock::now();
     session_->render({.first_sample = 0, .sample_count = 1});

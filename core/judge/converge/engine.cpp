@@ -68,7 +68,7 @@ private:
     std::string path(const std::string& name) const { return (fs::path(request_.output) / name).string(); }
     bool stopped() const { return watch_.stopRequested().has_value(); }
 
-    /// Rows are told apart by scene, backend and variant: each of these once.
+    /// Scene, backend and variant identify rows: each of these once.
     void refuseAmbiguity() {
         names_ = namesOfScenes(request_.scenes);
         refuseRepeats(request_.backends, "--backends");
@@ -132,7 +132,7 @@ private:
         }
     }
 
-    /// What this run is, for those who resume it; or, resuming, that it is the same.
+    /// Writes the identity of this run for a later --resume; when resuming, checks that it is the same.
     void claimFolder() {
         Experiment experiment{commonProperties(buildInfo(), request_.integrator)};
         for (std::size_t s = 0; s < scenes_.size(); ++s) {
@@ -186,7 +186,7 @@ private:
         return {};
     }
 
-    /// Where no reference was given: one from a quarter of the time. It is of the same estimator, which has
+    /// Without a reference, crt makes one in a quarter of the time. It is of the same estimator, which has
     /// far less noise, and so is blind to a bias that all light sampling shares; what it sees is a bias of
     /// sampler, roulette, seeds and backends.
     void makeReferences() {
@@ -257,8 +257,9 @@ private:
         return nullptr;
     }
 
-    /// Libraries, drivers and caches are warm before any start-up is timed: else whoever comes first pays
-    /// for all. Where starts take so long that little time would be left, it is not done, and said.
+    /// Libraries, drivers and caches are warmed up before any start-up is timed: otherwise the first
+    /// configuration would pay for all. Where starts take so long that little time would be left, it is not
+    /// done, and said.
     void warmUp(const Key& key, const Contestant::LoadScene& load) {
         if (elapsed() < (kReferenceShare + kWarmUpShare) * request_.seconds) {
             Contestant(key, load, nullptr, request_.integrator).prepare();
@@ -332,8 +333,8 @@ private:
         }
     }
 
-    /// Every so many replicates begin with a start of their own: each, unless starts would take more than
-    /// kStartShare of the time.
+    /// Replicates begin with a separate start at a fixed interval: each one, unless starts would take more
+    /// than kStartShare of the time.
     std::uint32_t replicatesForAStart(const Contestant& contestant, double share) {
         const double starts = std::ceil(contestant.startSeconds() / std::max(kStartShare * share, 1e-9));
         const auto every = static_cast<std::uint32_t>(std::clamp(starts, 1.0, 1e6));
