@@ -6,7 +6,7 @@
 #include "base/error.h"
 #include "base/temporary_folder.h"
 #include "compile/change_view.h"
-#include "view/board.h"
+#include "view/view_state.h"
 #include "view/camera_moves.h"
 #include "view/file_times.h"
 #include "view/http_server.h"
@@ -393,17 +393,17 @@ TEST_CASE("packets for tev have its layout", "[view]") {
         CHECK_THROWS_AS(crt::parseTevAddress(text), crt::Error);
 }
 
-TEST_CASE("who waits at the board is woken by news and by its end", "[view]") {
-    crt::Board board;
-    CHECK_FALSE(board.isWatched());
-    const std::uint64_t version = board.now().version;
-    CHECK(board.isWatched());
-    std::thread writer([&] { board.update([](crt::Status& status) { status.title = "news"; }); });
-    const auto sight = board.waitBeyond(version, std::chrono::seconds(60));
+TEST_CASE("who waits at the state is woken by news and by its end", "[view]") {
+    crt::ViewState state;
+    CHECK_FALSE(state.isWatched());
+    const std::uint64_t version = state.now().version;
+    CHECK(state.isWatched());
+    std::thread writer([&] { state.update([](crt::Status& status) { status.title = "news"; }); });
+    const auto copy = state.waitBeyond(version, std::chrono::seconds(60));
     writer.join();
-    CHECK(sight.status.title == "news");
-    CHECK(sight.version != version);
-    std::thread closer([&] { board.close(); });
-    CHECK(board.waitBeyond(sight.version, std::chrono::seconds(60)).closed);
+    CHECK(copy.status.title == "news");
+    CHECK(copy.version != version);
+    std::thread closer([&] { state.close(); });
+    CHECK(state.waitBeyond(copy.version, std::chrono::seconds(60)).closed);
     closer.join();
 }

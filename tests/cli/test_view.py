@@ -67,7 +67,7 @@ class Picture(CliTest):
             with refused.exception as reply:
                 self.assertEqual(reply.code, 400)
                 self.assertIn(words, reply.read().decode())
-        after, _ = view.sight()
+        after, _ = view.state()
         for key in ("white", "plane", "exposure_ev", "camera"):
             self.assertEqual(after[key], before[key])
 
@@ -282,7 +282,7 @@ class Access(CliTest):
             before, threads = harness.processor_seconds(view.process), self.threads_of(view)
             silent = [socket.create_connection(("127.0.0.1", view.port), 30) for _ in range(500)]
             for _ in range(5):
-                view.sight()
+                view.state()
             # The server has room for so many: the oldest gave way to those that came later.
             self.assertIn(sum(is_open(connection) for connection in silent), range(most // 2, most + 1))
             self.assertTrue(is_open(silent[-1]))
@@ -291,7 +291,7 @@ class Access(CliTest):
             self.assertLess(harness.processor_seconds(view.process) - before, 3)
             for connection in silent:
                 connection.close()
-            view.sight()
+            view.state()
             self.assertIsNone(view.process.poll())
             view.process.kill()
 
@@ -309,7 +309,7 @@ class Access(CliTest):
             with refused.exception as reply:
                 self.assertIn("no farther", reply.read().decode())
             view.change(orbit=[1, 1])
-            self.assertNotIn(None, view.sight()[0]["camera"]["position"])
+            self.assertNotIn(None, view.state()[0]["camera"]["position"])
             view.change(reset_camera=True)
 
     def test_a_port_that_is_taken_is_named(self):
@@ -347,7 +347,7 @@ class End(CliTest):
 
     def wait_in_vain(self, view, version):
         try:
-            view.sight(version)
+            view.state(version)
         except OSError:
             pass
 

@@ -1,4 +1,4 @@
-#include "judge/converge/contestant.h"
+#include "judge/converge/configuration_run.h"
 #include "film/resolve.h"
 
 #include "backend/loader.h"
@@ -62,7 +62,8 @@ std::optional<double> clockMhz() {
 
 }  // namespace
 
-Contestant::Contestant(Key key, LoadScene load, const Reference* reference, const IntegratorOptions& options)
+ConfigurationRun::ConfigurationRun(Key key, LoadScene load, const Reference* reference,
+                                   const IntegratorOptions& options)
     : load_(std::move(load)), options_(options), reference_(reference), tests_(1, 1, 3) {
     configuration_.key = std::move(key);
     configuration_.threads = options.threads;
@@ -70,7 +71,7 @@ Contestant::Contestant(Key key, LoadScene load, const Reference* reference, cons
     seed_ = scene_.sampler.seed;
 }
 
-void Contestant::open() {
+void ConfigurationRun::open() {
     session_.reset();
     scene_ = load_();
     const Stopwatch opening;
@@ -79,7 +80,7 @@ void Contestant::open() {
     start_seconds_ = scene_.parse_seconds + opening.seconds();
 }
 
-void Contestant::describe(const CompiledScene& compiled) {
+void ConfigurationRun::describe(const CompiledScene& compiled) {
     paths_ = {scene_.sampler.type != SamplerType::Sobol, brightestPathOf(compiled)};
     const CrtBackendReport report = session_->report();
     Configuration& c = configuration_;
@@ -102,7 +103,7 @@ void Contestant::describe(const CompiledScene& compiled) {
 }
 
 /// Measures a film after this number of samples.
-Row Contestant::look(const Film& film, std::uint32_t replicate, bool last) {
+Row ConfigurationRun::look(const Film& film, std::uint32_t replicate, bool last) {
     Row row;
     row.key = configuration_.key;
     row.seed = scene_.sampler.seed;
@@ -148,7 +149,7 @@ Row Contestant::look(const Film& film, std::uint32_t replicate, bool last) {
     return row;
 }
 
-void Contestant::keepPicture(const Film& film, const Image& image, double mean_luminance) {
+void ConfigurationRun::keepPicture(const Film& film, const Image& image, double mean_luminance) {
     last_image_ = image;
     last_error_ = {image.width, image.height, std::vector<float>(film.counts.size())};
     const LuminanceVariance variance(film);
@@ -160,7 +161,7 @@ void Contestant::keepPicture(const Film& film, const Image& image, double mean_l
 }
 
 /// The same seed and samples are the same bits as that replicate's look was.
-void Contestant::renderPicture(std::uint32_t replicate, std::uint64_t samples) {
+void ConfigurationRun::renderPicture(std::uint32_t replicate, std::uint64_t samples) {
     scene_.sampler.seed = seed_ + 1 + replicate;
     session_->setScene(session_->compile(scene_));
     session_->render({.first_sample = 0, .sample_count = samples});
@@ -171,7 +172,7 @@ void Contestant::renderPicture(std::uint32_t replicate, std::uint64_t samples) {
 
 /// Costs of the very first sample, such as an OpenCL driver that makes machine code late, belong to the
 /// start and not to a replicate.
-void Contestant::warmUp(const CompiledScene& compiled) {
+void ConfigurationRun::warmUp(const CompiledScene& compiled) {
     const Clock::time_point start = Clock::now();
     session_->render({.first_sample = 0, .sample_count = 1});
     configuration_.stages.first_sample = secondsSince(start);
@@ -179,7 +180,7 @@ void Contestant::warmUp(const CompiledScene& compiled) {
     session_->setScene(compiled);
 }
 
-void Contestant::prepare() {
+void ConfigurationRun::prepare() {
     const Clock::time_point setup = Clock::now();
     const CompiledScene compiled = session_->compile(scene_);
     session_->setScene(compiled);
@@ -189,13 +190,13 @@ void Contestant::prepare() {
     start_waits_ = true;
 }
 
-void Contestant::restart() {
+void ConfigurationRun::restart() {
     if (start_waits_) return;
     open();
     prepare();
 }
 
-StoredReplicate Contestant::stored(std::uint32_t replicate) const {
+StoredReplicate ConfigurationRun::stored(std::uint32_t replicate) const {
     StoredReplicate stored;
     for (const auto& [samples, planes] : looks_)
         if (const auto plane = planes.find(replicate); plane != planes.end())
@@ -205,7 +206,7 @@ StoredReplicate Contestant::stored(std::uint32_t replicate) const {
     return stored;
 }
 
-void Contestant::restore(std::uint32_t replicate, const StoredReplicate& stored) {
+void ConfigurationRun::restore(std::uint32_t replicate, const StoredReplicate& stored) {
     for (const auto& [samples, plane] : stored.looks) looks_[samples][replicate] = plane;
     samples_reached_ = std::max(samples_reached_, stored.looks.back().first);
     tests_.add(std::vector<double>(stored.rgb.begin(), stored.rgb.end()));
@@ -218,7 +219,7 @@ void Contestant::restore(std::uint32_t replicate, const StoredReplicate& stored)
     last_error_ = {configuration_.width, configuration_.height, stored.standard_error};
 }
 
-bool Contestant::replicate(std::uint32_t replicate, std::uint64_t most_samples, double seconds,
+bool ConfigurationRun::replicate(std::uint32_t replicate, std::uint64_t most_samples, double seconds,
                            const std::function<void(const Row&)>& found, const std::function<bool()>& stop) {
     scene_.sampler.seed = seed_ + 1 + replicate;
     const CompiledScene compiled = session_->compile(scene_);
@@ -260,7 +261,7 @@ bool Contestant::replicate(std::uint32_t replicate, std::uint64_t most_samples, 
     return true;
 }
 
-void Contestant::finish(std::uint64_t map_samples) {
+void ConfigurationRun::finish(std::uint64_t map_samples) {
     if (last_image_.pixels.empty()) return;
     if (reference_ != nullptr && !reference_->fold_rgb.empty() && tests_.count() >= 2) {
         stats::Replicates eighths(configuration_.width, configuration_.height, 3);
@@ -273,7 +274,7 @@ void Contestant::finish(std::uint64_t map_samples) {
     fillMaps(map_samples);
 }
 
-void Contestant::fillMaps(std::uint64_t samples) {
+void ConfigurationRun::fillMaps(std::uint64_t samples) {
     Configuration& c = configuration_;
     c.maps.samples = samples;
     c.maps.image = last_image_;
@@ -305,12 +306,12 @@ void Contestant::fillMaps(std::uint64_t samples) {
                 .error};
 }
 
-std::uint64_t commonSamples(const std::vector<std::unique_ptr<Contestant>>& contestants,
+std::uint64_t commonSamples(const std::vector<std::unique_ptr<ConfigurationRun>>& runs,
                             const std::string& scene) {
     std::uint64_t samples = std::numeric_limits<std::uint64_t>::max();
-    for (const auto& contestant : contestants)
-        if (contestant->key().scene == scene && contestant->samplesReached() > 0)
-            samples = std::min(samples, contestant->samplesReached());
+    for (const auto& run : runs)
+        if (run->key().scene == scene && run->samplesReached() > 0)
+            samples = std::min(samples, run->samplesReached());
     return samples;
 }
 

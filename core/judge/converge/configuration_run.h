@@ -18,12 +18,12 @@
 
 namespace crt::converge {
 
-class Contestant {
+class ConfigurationRun {
 public:
     using LoadScene = std::function<Scene()>;
 
     /// Loads the scene and the backend. Throws crt::Error when it cannot run.
-    Contestant(Key key, LoadScene load, const Reference* reference, const IntegratorOptions& options);
+    ConfigurationRun(Key key, LoadScene load, const Reference* reference, const IntegratorOptions& options);
 
     /// Compiles the scene and renders one sample that does not count: all that is needed before the first
     /// replicate, and timed as its start.
@@ -89,8 +89,8 @@ private:
     Plane last_error_;          ///< The image's own standard error, relative to its mean.
 };
 
-/// The most samples that all contestants of a scene reached: maps of the same samples can be compared.
-std::uint64_t commonSamples(const std::vector<std::unique_ptr<Contestant>>& contestants,
+/// The most samples that all runs of a scene reached: maps of the same samples can be compared.
+std::uint64_t commonSamples(const std::vector<std::unique_ptr<ConfigurationRun>>& runs,
                             const std::string& scene);
 
 /// Writes the error that follows from a comparison of replicates: (R − 1)/R · mean (I_r − mean of the
