@@ -1,4 +1,4 @@
-"""What bench/run and bench/peers have in common on the command line."""
+"""The command line that bench/run and bench/peers share."""
 import pathlib
 import sys
 

@@ -20,7 +20,7 @@ COLOURS = {
 
 
 def measure(program, arguments):
-    log_log.library()  # What is missing is said before hours are spent.
+    log_log.library()  # Missing parts are reported before hours are spent.
     resolutions = (72, 144) if arguments.tiny else (1440, 2880)
     # Seconds that one render may take: a processor does not get to 1024.
     longest = 0.2 if arguments.tiny else 16.0
@@ -40,7 +40,7 @@ def few_runs(spp, _seconds):
 
 def timings(program, backends, resolutions, longest, settings=(), runs=few_runs, keep=print):
     """A row for every render: of growing numbers of samples, as long as one is likely to take less than
-    `longest` seconds. `runs(spp, seconds of the last)`: how often each is rendered; `keep(row)` is told of
+`longest` seconds. `runs(spp, seconds of the last)`: how often each is rendered; `keep(row)` gets
     each row when it is there."""
     rows = []
     for resolution in resolutions:

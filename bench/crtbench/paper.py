@@ -1,5 +1,5 @@
-"""What bench/paper measures: rows, a JSON object each, that crtbench/paper_page.py makes a page of. A row's
-`part` says what it is of; `absent` is what could not be measured, with the reason."""
+"""The measurements of bench/paper: rows, a JSON object each, from which crtbench/paper_page.py makes a page.
+A row's `part` says what it is of; `absent` is what could not be measured, with the reason."""
 
 import datetime
 import json

@@ -76,7 +76,7 @@ def integral(nm, values):
 def predicted_ratios(repository, described, scene):
     """Mitsuba/crt in X, Y, Z that the observer's tables alone account for: light of the lamp after 0 …
     3 reflections by white. Both tables are taken as piecewise linear; Mitsuba's has a node every 5 nm and is
-    divided by a constant of its own, crt's every nm and is divided by ∫ȳdλ.
+divided by a separate constant, crt's every nm and is divided by ∫ȳdλ.
     """
     fine = np.arange(360.0, 830.0 + 1e-9, 0.125)
     nm = np.arange(360.0, 831.0)

@@ -1,6 +1,6 @@
-"""What bench/peers and bench/agree need beside crt: a Python with mitsuba, numpy and PyYAML, for the chart
-of bench/peers with matplotlib too, and an LLVM that Mitsuba's compiler accepts. Both are put into out/ when
-they are missing; nothing of them is ever part of the product. The measurement then runs under that
+"""The requirements of bench/peers and bench/agree besides crt: a Python with mitsuba, numpy and PyYAML, for
+the chart of bench/peers with matplotlib too, and an LLVM that Mitsuba's compiler accepts. Both are put into
+out/ when they are missing; nothing of them is ever part of the product. The measurement then runs under that
 Python."""
 
 import argparse
@@ -127,7 +127,7 @@ def main():
 
 
 def under_mitsuba(tool, wanted):
-    """Starts bench/TOOL anew under a Python that has mitsuba, unless this one is it."""
+    """Restarts bench/TOOL under a Python that has mitsuba, unless this one is it."""
     os.environ["DRJIT_LIBLLVM_PATH"] = llvm_library()
     if READY not in os.environ:
         python = python_with_mitsuba(wanted)

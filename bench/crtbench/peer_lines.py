@@ -1,8 +1,8 @@
-"""The contestants of bench/peers. Each renders the Cornell box with so many samples and a seed, and says
-what it cost; images are XYZ, row 0 at the top.
+"""The contestants of bench/peers. Each renders the Cornell box with a given number of samples and a seed,
+and reports its cost; images are XYZ, row 0 at the top.
 
-What tells them apart: `renderer`, `engine` (a backend of crt or a variant of Mitsuba), `replicates` (of
-crt's sampler, otherwise 1) and `roulette`; `name` is for people.
+Their identity: `renderer`, `engine` (a backend of crt or a variant of Mitsuba), `replicates` (of crt's
+sampler, otherwise 1) and `roulette`; `name` is for people.
 """
 
 import json
@@ -142,7 +142,7 @@ class Worker:
         raise Failure(f"Mitsuba ({self.variant}) has ended: {self.process.stderr.read().strip()[-800:]}")
 
     def once(self, request, home):
-        """A process of its own for one request: (answer, wall seconds, processor seconds). Mitsuba keeps
+        """A separate process for one request: (answer, wall seconds, processor seconds). Mitsuba keeps
         compiled kernels below HOME."""
         before, begin = crt.children_seconds(), time.perf_counter()
         done = subprocess.run(

@@ -34,8 +34,8 @@ def agreement(program, pools, described, scene):
     )
     tile, tile_se = peer_agreement.ratio(a, b, peer_agreement.tiles)
     both = np.minimum(a.mean()[:, :, 1], b.mean()[:, :, 1])
-    # Pixels wholly of the lamp: bright, with neighbours as bright. What they hold beside the lamp's own
-    # light is some thousandths.
+    # Pixels wholly of the lamp: bright, with neighbours as bright. Their values besides the lamp's own light
+    # are some thousandths.
     bright = both > 0.5 * both.max()
     lamp = bright.copy()
     for axis in (0, 1):
@@ -187,7 +187,7 @@ def timing_row(line, target, pixels):
 
 
 class Race:
-    """Who takes how long to the target, and the best of crt's Embree lines and of Mitsuba's on the
+    """Times to the target, and the best of crt's Embree lines and of Mitsuba's on the
     processor."""
 
     def __init__(self, lines, starts, target, pixels):

@@ -17,7 +17,7 @@ GRID_NM = np.arange(
 
 
 def table(spectra, name):
-    """A spectrum as {nm, value}, or a number. What lies outside its table is clamped, and written out,
+    """A spectrum as {nm, value}, or a number. Values outside its table are clamped, and written out,
     since other renderers take zero there."""
     given = spectra.get(name, name) if isinstance(name, str) else name
     if isinstance(given, (int, float)):

@@ -35,8 +35,8 @@ class Line:
         self.points, self.spent, self.share = [], 0.0, 0.0
 
     def wants(self, spp):
-        """Whether `spp` still fits into this line's share, were it to cost in proportion to the last. Three
-        points are needed in any case."""
+        """True if `spp` still fits into this line's share, were it to cost in proportion to the last. Three
+points are always needed."""
         if len(self.points) < 3:
             return True
         last = self.points[-1]

@@ -1,5 +1,5 @@
-"""What a measurement leaves behind: NAME.md for people, NAME.json for programs, both saying on what and
-with what it was measured."""
+"""The results of a measurement: NAME.md for people, NAME.json for programs, both with the machine and the
+versions."""
 
 import datetime
 import json

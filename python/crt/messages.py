@@ -1,5 +1,5 @@
 """The messages of libcrt go to the logger `crt`, which shows warnings and errors unless it is configured
-    otherwise."""
+otherwise."""
 
 import logging
 

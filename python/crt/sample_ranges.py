@@ -62,7 +62,7 @@ class PartSize:
 
     def is_known(self, seconds):
         """True if parts may have the size that takes this time, not only a few times that of earlier
-            ones."""
+        ones."""
         return self.fixed is not None or (self.speed is not None and self.largest >= self.speed * seconds)
 
     def shrinks(self, seconds, left, threads):
@@ -73,7 +73,7 @@ class PartSize:
 
     def next(self, seconds, least, left, threads):
         """Shares `left` samples between this number of threads, in parts of at least this number of
-            seconds."""
+        seconds."""
         if self.fixed is not None:
             return self.fixed
         share = left / (2 * max(threads, 1))

@@ -3,7 +3,7 @@
 things, no idioms. CONTRIBUTING.md has the rules with examples. Messages and pages may break none of the
 patterns below; comments break COMMENTS of them, a number that may only fall. Exit code 1 names the lines.
 
-    tests/rooms/check_language.py [--comments] [--root FOLDER] [FOLDER...]   only these; also of comments
+tests/rooms/check_language.py [--comments] [--root FOLDER] [FOLDER...]   only these; also of comments
 """
 
 import argparse
@@ -23,7 +23,7 @@ PAGES = ("README.md", "CONTRIBUTING.md")
 SEEN = ("core", "plugins", "python/crt", "python/src")
 # Folders with a separate bound, which may only fall.
 LATER = {"core/kernel": 113, "core/judge/verify": 65, "docs/results": 69}
-COMMENTS = 328
+COMMENTS = 220
 # The rules quote what they forbid.
 QUOTES = {"CONTRIBUTING.md", "tests/rooms/check_language.py", "tests/rooms/test_language.py"}
 

@@ -29,7 +29,7 @@ class Thing:
 
 class Draft:
     """The scene that importers add to. `mirrored`: the other program's image is that of the mirrored world,
-        which crt
+    which crt
     gets then: x is -x."""
 
     def __init__(self, path):

@@ -110,7 +110,7 @@ class Values:
 
     def light(self, parameters, name, scale):
         """The spectrum of a light. Its luminance is `scale`, independent of its own scale; of a colour,
-            times
+        times
         that."""
         made = self.form(parameters, name, "zero") if parameters.has(name) else None
         if made is None:
