@@ -603,8 +603,7 @@ void addDielectrics(std::vector<SectionSchema>& all) {
         .doc =
             "Absorption coefficient of the inside, by the Beer–Lambert law: over a distance d the "
             "share exp(−absorption · d) is left. The mesh must be closed. Of nested bodies the "
-            "innermost absorbs, even if it is clear; behind it the outer one absorbs again. Device and "
-            "output "
+            "innermost absorbs, even if it is clear; behind it the outer one absorbs again. Where "
             "bodies overlap, the one that light entered last absorbs. Cameras (the middle of their "
             "lens) and lights may be inside bodies. Bodies may touch. Overlap them a little where "
             "other surfaces are inside two bodies that share a face, or where the faces that touch are "
