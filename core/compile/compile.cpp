@@ -273,8 +273,8 @@ void warnOfNearSurfaces(const Scene& scene, const CompiledScene& compiled) {
     if (const std::optional<CoplanarLight> found = findCoplanarLight(searched))
         logWarning(
             "{} lies in the plane of {} and overlaps it: rounding decides which of them is seen, and the "
-            "image is wrong there; move the light {:.3g} "
-            "or more towards the side that it lights, or cut a hole for it",
+            "image is wrong there; move the light {:.3g} or more towards the side that it lights, or cut a "
+            "hole for it",
             objectOf(scene, compiled, found->light), objectOf(scene, compiled, found->surface),
             found->least_gap);
     if (const CoarseLights found = findCoarseLights(compiled); found.lights > 0)

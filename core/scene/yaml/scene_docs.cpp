@@ -361,13 +361,12 @@ std::string mtlTable() {
         "warning. If a file is missing, the mesh loses its materials, and `material` is used instead. A "
         "material is, by the first rule that applies,\n\n"
         "1. glass (dielectric, smooth and clear), if `Ni` is above 1 and the material lets light pass: `d` "
-        "below 1, `Tr` above 0 without `d`, a `Tf` that is "
-        "neither black nor white, `illum` 6, 7 or 9, or `illum` 4 without a white `Tf`;\n"
+        "below 1, `Tr` above 0 without `d`, a `Tf` that is neither black nor white, `illum` 6, 7 or 9, or "
+        "`illum` 4 without a white `Tf`;\n"
         "2. a mirror, if `Pm` is 0.5 or more, or `illum` is 3 or 5 with Kd ≤ 0.1 and a Ks;\n"
         "3. diffuse.\n\n"
         "One line per file reports the resulting materials, the statements that were left out, and the "
-        "keywords "
-        "that are not in this table. A statement with invalid numbers counts as left out.\n\n"
+        "keywords that are not in this table. A statement with invalid numbers counts as left out.\n\n"
         "| MTL | Arguments | Meaning in crt |\n|---|---|---|\n";
     for (const MtlKey& key : mtlKeys()) {
         std::string words = fmt::format("`{}`", key.keyword);
