@@ -43,7 +43,7 @@ public:
               1024))),
           bits_(kBits / 64) {}
 
-    /// Returns false if so many cells are marked that the search is pointless.
+    /// Returns false if the search is pointless because too many cells are marked.
     bool mark(const TriangleBounds& box) {
         const Range range = rangeOf(box);
         marked_ += range.cells();
