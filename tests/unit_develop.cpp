@@ -1,4 +1,4 @@
-// What a film knows of its scene (film_record.h), and what becomes of it in files.
+// The record of a film about its scene (film_record.h), and its use in files.
 #include "catch.h"
 #include "compile/compile.h"
 #include "film/checkpoint.h"
@@ -274,7 +274,7 @@ TEST_CASE("whatever makes a film another one is said in words", "[develop]") {
         for (const std::string& difference : differences) all += difference + "; ";
         CHECK_THAT(all, Contains(words));
     }
-    // What no sample depends on is no difference.
+    // Settings that do not affect samples are no difference.
     for (const SceneOverride& change : {SceneOverride{"film.exposure_ev", "2"},
                                         {"film.color_space", "xyz"},
                                         {"title", "other"},

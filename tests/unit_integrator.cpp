@@ -117,7 +117,7 @@ TEST_CASE("any split of ranges and rectangles gives the same film", "[integrator
     integrator.render({{}, 0, 4});
     integrator.render({{3, 2, 8, 6}, 4, 6});
     Film split = filmOf(scene);
-    // A film knows ranges that every pixel has.
+    // A film records ranges that every pixel has.
     CHECK(kindOfFailure([&] { integrator.readFilm(split); }, "do not cover it yet") == ErrorKind::Internal);
     CHECK(kindOfFailure(
               [&] {

@@ -1,4 +1,4 @@
-// What bench/paper measures is right: the processor's sums, boxes and sweeps, and the kernels, played by
+// The results of bench/paper are right: the processor's sums, boxes and sweeps, and the kernels, played by
 // threads of the host (the program itself sees on every GPU that its results are those of the processor).
 #include "catch.h"
 

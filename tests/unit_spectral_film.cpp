@@ -106,7 +106,7 @@ TEST_CASE("a film keeps its bins and responses in its file", "[spectral]") {
     CHECK(back.shape() == film.shape());
     CHECK(back.sums == film.sums);
     CHECK(back_identity.record->spectral == identity.record->spectral);
-    // What its channels are only the record says.
+    // Only the record gives the meaning of its channels.
     FilmIdentity without = identity;
     without.record.reset();
     CHECK_THROWS_AS(writeCheckpoint(path, film, without), Error);

@@ -1,5 +1,4 @@
-// The view: a camera in somebody's hands, a compiled scene seen otherwise, the names of surfaces, and who is
-// answered.
+// The view: a moved camera, a compiled scene seen with it, the names of surfaces, and access control.
 #include "compiled_scenes.h"
 #include "scene_texts.h"
 
@@ -244,7 +243,7 @@ TEST_CASE("slow devices begin with small pictures, fast ones with the whole", "[
     CHECK(pace.firstDivisor(pixels) == 1);
     CHECK(pace.samplesOfChunk(pixels, false) == 30);
     CHECK(pace.samplesOfChunk(pixels, true) == 400);
-    // What it takes to show a picture is not spent on samples as well.
+    // The time to show a picture is not spent on samples as well.
     pace.handedOn(0.005);
     CHECK(pace.samplesOfChunk(pixels, false) == 30);
     for (int i = 0; i < 30; ++i) pace.handedOn(0.0245);

@@ -120,7 +120,7 @@ class Converging(LightTest):
                 run = self.converge("scene.yaml", *changed, "--resume", expect=2)
                 self.assert_one_error(run, "a different experiment", what)
         self.assertEqual(self.rows("out"), before)
-        # What is measured is scene radiance, whatever a screen is shown.
+        # The measured quantity is scene radiance, independent of the display.
         self.converge(
             "scene.yaml", *SMALL, "--set", "film.exposure_ev=1", "--set", "film.white_balance=A", "--resume"
         )

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What must not be able to harm crt: inputs and faults, each with what happens. Always the same
+"""Inputs and faults that must not be able to harm crt, each with its outcome. Always the same
 demand: an exit code of the documented ones and the right one, a message that says why, no crash, no hang, no
 memory that the input does not account for, and every file that was there still there.
 
@@ -74,7 +74,7 @@ class Case:
 
 
 class Folder:
-    """Where one case runs."""
+    """The folder of one case."""
 
     def __init__(self, path):
         self.path = path
@@ -1788,7 +1788,7 @@ def large_film(samples):
 # running
 
 def descriptor_for(place, read_side):
-    """What a standard stream is opened on; None is closed."""
+    """The file on which a standard stream is opened; None is closed."""
     if place == "closed":
         return None
     if place == "broken":  # A pipe whose reader has gone.
@@ -1858,7 +1858,7 @@ def text_of(captured):
 
 
 def run(case_, number):
-    """What happened, and what of it is wrong."""
+    """The outcome, and the errors in it."""
     folder = Folder(os.path.join(WORK, f"case{number}"))
     os.mkdir(folder.path, 0o755)
     if case_.prepare:

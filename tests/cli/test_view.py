@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""`crt view` as its pages see it: the picture and what changes it, files that change, errors, and who is let
-in. What a browser makes of it is asked by tests/view/test_page.py.
+"""`crt view` as its pages see it: the picture and what changes it, files that change, errors, and access
+control. tests/view/test_page.py tests the page in a browser.
 
     test_view.py CRT CONFIG_DIR FAKE_PLUGIN_DIR [unittest arguments]
 """
@@ -275,7 +275,7 @@ class Access(CliTest):
             connection.close()
 
     def test_silent_connections_lock_nobody_out(self):
-        """Whoever has the token is answered while they are there, and not once they have ended."""
+        """Requests with the token are answered during the run, and not after its end."""
         for limit, most in ((None, 256), (64, 8)):
             view = View(self, "-b", "fake", most_descriptors=limit)
             view.wait_until_done()
@@ -283,7 +283,7 @@ class Access(CliTest):
             silent = [socket.create_connection(("127.0.0.1", view.port), 30) for _ in range(500)]
             for _ in range(5):
                 view.state()
-            # The server has room for so many: the oldest gave way to those that came later.
+            # The server has room for this number: the oldest gave way to those that came later.
             self.assertIn(sum(is_open(connection) for connection in silent), range(most // 2, most + 1))
             self.assertTrue(is_open(silent[-1]))
             # Those that only connect cost no threads, and nothing while they are silent.
@@ -397,7 +397,7 @@ class Tev(CliTest):
 
 
 def is_open(connection):
-    """Whether the other end has neither closed it nor sent anything."""
+    """True if the other end has neither closed it nor sent anything."""
     connection.setblocking(False)
     try:
         connection.recv(1)
@@ -409,7 +409,7 @@ def is_open(connection):
 
 
 def is_newer(status, than):
-    """Whether its picture was made after the other's."""
+    """True if its picture was made after the other's."""
     return status["picture"]["number"] > than["picture"]["number"]
 
 

@@ -83,7 +83,7 @@ class View:
 
 
 def is_done(status):
-    """Whether the picture has all samples of the whole film, from where the camera is."""
+    """True if the picture has all samples of the whole film, from the place of the camera."""
     picture = status.get("picture")
     return (bool(picture) and picture["divisor"] == 1 and picture["of_this_camera"]
             and status["samples"] == status["samples_wanted"] and picture["samples"] == status["samples"])

@@ -1,4 +1,4 @@
-/// What readers of meshes promise to everybody behind them.
+/// The guarantees of readers of meshes.
 #pragma once
 
 #include "fuzz_target.h"
