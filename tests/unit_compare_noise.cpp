@@ -250,8 +250,8 @@ TEST_CASE("words, figures and JSON of a noise comparison agree in every branch",
     Image plain = blank({"R", "G", "B"}, "9");
     plain.pixels.assign(std::size_t{3} * kWidth * kHeight, 2.0f);
     for (const auto& [first, second, why] : {std::tuple{&a, &a, "both have seed 1"},
-                                             {&lost, &b, "A does not know the noise of all"},
-                                             {&b, &lost, "B does not know the noise of all"}}) {
+                                             {&lost, &b, "A lacks the noise of some"},
+                                             {&b, &lost, "B lacks the noise of some"}}) {
         const NoiseComparison noise = compareNoise(*first, *second);
         CHECK_THAT(noise.unknown, Contains(why));
         CHECK(noise.channels.empty());

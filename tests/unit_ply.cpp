@@ -452,7 +452,7 @@ TEST_CASE("a PLY says the same in blocks of any size and with any number of thre
     };
     const std::string whole = digest(good, 1000), refusal = digest(bad, 1000);
     CHECK_THAT(whole, Contains("shaded flat"));
-    CHECK_THAT(refusal, Contains("face 17 of 30, counted from 0, names vertex 57"));
+    CHECK_THAT(refusal, Contains("face 17 of 30, counted from 0, uses vertex 57"));
     for (const unsigned threads : {1u, 3u, 16u})
         runWithThreads(threads, [&] {
             for (std::size_t rows = 1; rows < 45; ++rows) {

@@ -207,7 +207,7 @@ class Converging(LightTest):
             ("film.resolution=[8,8]", "the resolution is 16 × 16, not 8 × 8"),
             ("integrator.max_depth=3", "max_depth is 16, not 3"),
             ("camera.fov=20", "the camera is at"),
-            ("materials.floor.reflectance=0.2", "the materials are others"),
+            ("materials.floor.reflectance=0.2", "the materials differ"),
         ):
             with self.subTest(change=change):
                 run = self.converge(

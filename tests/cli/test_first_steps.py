@@ -85,10 +85,10 @@ class Exposure(CliTest):
             exposure = f"film.exposure_ev={stops}"
             return self.crt("lit.yaml", "-b", "fake", "-o", "a.png", "--set", exposure).stderr
 
-        said = re.search(r"warning: 'a.png': .* about ([\d.]+) stops less of film.exposure_ev", render(6))
+        said = re.search(r"warning: 'a.png': .* reduce film.exposure_ev by about ([\d.]+) stops", render(6))
         self.assertTrue(said)
-        self.assertNotIn("too bright", render(6 - float(said[1])))
-        self.assertIn("too bright", render(6 - float(said[1]) + 1))
+        self.assertNotIn("overexposed", render(6 - float(said[1])))
+        self.assertIn("overexposed", render(6 - float(said[1]) + 1))
 
     def test_auto_is_an_exposure_that_can_be_written_down(self):
         run = self.crt("lit.yaml", "-b", "fake", "-o", "a.ppm", "-o", "a.pfm", "-o", "a.crtfilm", "--expose",

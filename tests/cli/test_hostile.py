@@ -514,7 +514,7 @@ def scene_cases():
         + MATERIALS
         + f"objects:\n- &o {{{TRIANGLE}, material: m, transforms: [&p {placement}{', *p' * 9999}]}}\n"
         + "- *o\n" * 1000,
-        words=("values behind aliases, which take", "CRT_SCENE_MEMORY="),
+        words=("values behind aliases, which need", "CRT_SCENE_MEMORY="),
     )
     placement = "[]"  # A single value, so that there may be more of them.
     scene(
@@ -523,7 +523,7 @@ def scene_cases():
         + MATERIALS
         + f"objects:\n- &o {{{TRIANGLE}, material: m, transforms: [&p {placement}{', *p' * 9999}]}}\n"
         + "- *o\n" * 1000,
-        words=("placements, which take", "CRT_SCENE_MEMORY="),
+        words=("placements, which need", "CRT_SCENE_MEMORY="),
     )
     scene(
         "the same behind 500, allowed but for its triangles",
@@ -531,7 +531,7 @@ def scene_cases():
         + MATERIALS
         + f"objects:\n- &o {{{TRIANGLE}, material: m, transforms: [&p {placement}{', *p' * 9999}]}}\n"
         + "- *o\n" * 500,
-        words=("triangles, which take", "CRT_SCENE_MEMORY="),
+        words=("triangles, which need", "CRT_SCENE_MEMORY="),
     )
     scene(
         "a face of 5,000 corners behind 20,000 aliases (167 kB)",
