@@ -97,7 +97,7 @@ double meanOf(const std::vector<double>& values) {
     return sum / static_cast<double>(values.size());
 }
 
-/// What one number of samples looked like in every seed.
+/// The results of all seeds with one number of samples.
 class Images {
 public:
     void add(const std::vector<double>& y) {
@@ -236,8 +236,9 @@ void printLook(const std::string& name, const Looks& looks) {
         mean_covered, known > 0 ? ratio / known : 0, std::sqrt(squares) / truth, dof, z, z_within);
 }
 
-/// What --target-error would have stopped at, and how often the image was worse than its target. It looks
-/// when the number of samples is a power of two from 64 on, earlier than crt does with so few pixels.
+/// The samples at which --target-error would have stopped, and the number of images that were worse than
+/// their target. It looks when the number of samples is a power of two from 64 on, earlier than crt does
+/// with so few pixels.
 void printStops(const std::map<std::uint64_t, Looks>& looks) {
     const double real = looks.rbegin()->second.images.relativeRmse();
     for (const double target : kTargets) {
@@ -258,7 +259,7 @@ void printStops(const std::map<std::uint64_t, Looks>& looks) {
 
 void stated(const Setup& setup, std::uint64_t seeds) {
     std::map<std::uint64_t, Looks> looks;
-    Looks merged;  // What a merge of two machines' unequal ranges leaves.
+    Looks merged;  // The film after a merge of two machines' unequal ranges.
     PathFacts paths{setup.independent(), {}};
     const auto look = [&](Looks& at, const Film& film) {
         at.images.add(luminanceOf(film));

@@ -1,6 +1,6 @@
-// What crt converge says about renders whose truth is known by construction: one JSON object a line for
-// every statement in every situation, with how often it was wrong. bench/run false-alarms makes a page of
-// them.
+// The statements of crt converge about renders whose truth is known by construction: one JSON object per
+// line for every statement in every situation, with the number of wrong ones. bench/run false-alarms makes a
+// page of them.
 //
 //     false_alarms REPEATS
 #include "base/error.h"
@@ -25,7 +25,7 @@ using namespace crt::converge;
 
 namespace {
 
-/// How often a statement was made, and how often it was wrong.
+/// Counts of a statement: how often it was made, and how often it was wrong.
 struct Tally {
     double stated = 0;  ///< Part that may be wrong.
     std::uint64_t asked = 0, wrong = 0;
@@ -191,8 +191,7 @@ Configuration configurationOf(const std::string& backend, const std::string& var
     return configuration;
 }
 
-/// Four configurations that are alike but for their seeds: whoever is said to be ahead of another is a false
-/// alarm.
+/// Four configurations that are alike but for their seeds: every lead of one over another is a false alarm.
 void measureRanking(int repeats) {
     SyntheticRender what;
     what.variance = 0.02;

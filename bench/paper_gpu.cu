@@ -104,7 +104,7 @@ std::vector<double> timedOnDevice(int runs, const Launch& launch) {
     return seconds;
 }
 
-/// What the GPU holds at once of a kernel, and no more blocks than there are groups of numbers.
+/// The blocks of a kernel that the GPU holds at once, and no more than there are groups of numbers.
 template <typename Kernel>
 unsigned gridFor(Kernel kernel, std::size_t groups, const cudaDeviceProp& device) {
     int blocks = 0;

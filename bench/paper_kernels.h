@@ -42,8 +42,8 @@ __device__ float blockTotal(float value, float* scratch) {
     return value;
 }
 
-/// Whether this block is the last of the grid to come here. What thread 0 of the others wrote before is
-/// there to be read. `arrived` is 0 before and after.
+/// True if this block is the last of the grid to come here. Earlier writes of thread 0 of the other blocks
+/// are then readable. `arrived` is 0 before and after.
 __device__ inline bool isLastBlock(unsigned* arrived, bool* answer) {
     if (threadIdx.x == 0) {
         __threadfence();
@@ -113,7 +113,7 @@ struct ThreadBox {
     }
 };
 
-// How points lie in memory, and how much of them a load takes.
+// Layout of points in memory, and the part of them that a load takes.
 
 /// x y z x y z …, by loads of 4 bytes.
 struct PointsAos {

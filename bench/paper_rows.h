@@ -1,5 +1,5 @@
-/// How bench/paper_host.cpp and bench/paper_gpu.cu read their command line, time their runs and print a
-/// row.
+/// Reads the command line, times the runs and prints the rows of bench/paper_host.cpp and
+/// bench/paper_gpu.cu.
 #pragma once
 
 #include "paper_work.h"
@@ -40,14 +40,14 @@ inline Options optionsOf(int argc, char** argv, const std::vector<std::string>& 
     return options;
 }
 
-/// How many numbers are summed: the paper's range.
+/// Number of values to sum: the paper's range.
 inline std::vector<std::size_t> sumCounts(const Options& options) {
     if (options.quick) return {5'000, 1'000'003};
     return {5'000, 10'000, 100'000, 1'000'000, 10'000'000, 100'000'000};
 }
 
-/// What is boxed: a name and the corners of its triangles. "random" is none of the paper's: large enough
-/// that memory is what limits.
+/// Input of the boxes: a name and the corners of its triangles. "random" is none of the paper's: large
+/// enough that memory is what limits.
 struct Cloud {
     std::string name;
     std::vector<float> points;

@@ -1,4 +1,4 @@
-/// What bench/paper_host.cpp and bench/paper_gpu.cu have in common: the numbers that are summed, the points
+/// The shared parts of bench/paper_host.cpp and bench/paper_gpu.cu: the numbers that are summed, the points
 /// that are boxed, the triangles that rays are tested against, the processor's ways to do all three, how
 /// runs are timed, and how a line of the output looks. Standard library only, C++17, so that nvcc and any
 /// compiler take it and the programs run on machines that have nothing else.
@@ -52,7 +52,7 @@ public:
 
     unsigned count() const { return count_; }
 
-    /// work(i) for every i < count(), each in a thread of its own; 0 in the caller's.
+    /// work(i) for every i < count(), each in a separate thread; 0 in the caller's.
     void run(const std::function<void(unsigned)>& work) {
         {
             const std::lock_guard lock(mutex_);
@@ -128,8 +128,8 @@ inline double exactSum(const float* values, std::size_t count) {
     return sum;
 }
 
-/// How far a float sum of numbers >= 0 whose exact sum is `exact` may be off, where no number goes through
-/// more than `additions` roundings (Higham 2002, 4.2).
+/// Error bound of a float sum of numbers >= 0 whose exact sum is `exact`, if no number goes through more
+/// than `additions` roundings (Higham 2002, 4.2).
 inline double sumBound(double exact, double additions) {
     const double u = 0x1p-24;
     return exact * additions * u / (1 - additions * u);
@@ -293,7 +293,7 @@ PAPER_ANYWHERE inline Ray rayAt(std::uint32_t index) {
 
 /// The test of Möller and Trumbore (1997): distance in units of the direction's length, or `limit` where
 /// the ray misses. A triangle is a corner and the two edges from it. The same operations everywhere; both
-/// compilers are told not to contract them, so that processor and GPU agree bit for bit.
+/// compilers have options that forbid contraction, so that processor and GPU agree bit for bit.
 PAPER_ANYWHERE inline float distanceTo(const Ray& ray, const float* t, float limit) {
     const float *d = ray.to, *a = t, *e = t + 3, *f = t + 6;
     const float px = d[1] * f[2] - d[2] * f[1], py = d[2] * f[0] - d[0] * f[2],

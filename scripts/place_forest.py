@@ -55,7 +55,7 @@ def is_in_glade(x, z, margin):
 
 
 def is_near_view(x, z, margin):
-    """Whether it is seen, or less than `margin` metres beside what is."""
+    """True if it is visible, or less than `margin` metres beside what is."""
     dx, dz = x - CAMERA[0], z - CAMERA[1]
     size = math.hypot(*VIEW)
     ahead, beside = (dx * VIEW[0] + dz * VIEW[1]) / size, (dx * VIEW[1] - dz * VIEW[0]) / size

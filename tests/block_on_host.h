@@ -17,7 +17,7 @@ struct HostDim {
 inline thread_local HostDim gridDim{1}, blockDim{1}, blockIdx{0}, threadIdx{0};
 
 namespace block_on_host {
-/// What the threads of the running block share.
+/// State that the threads of the running block share.
 inline std::barrier<>* all_threads = nullptr;
 inline std::vector<std::barrier<>*> warps;
 inline std::vector<float> shuffled;

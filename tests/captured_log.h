@@ -1,4 +1,4 @@
-// What the log says, for tests that check it.
+// Captures the log, for tests that check it.
 #pragma once
 
 #include "base/log.h"

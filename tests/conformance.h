@@ -1,4 +1,4 @@
-/// What the conformance suite's files share: the backend under test, and scenes.
+/// The shared parts of the conformance suite: the backend under test, and scenes.
 #pragma once
 
 #include "backend/integrator.h"

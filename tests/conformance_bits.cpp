@@ -27,7 +27,7 @@ using namespace conformance;
 
 namespace {
 
-/// What glass can be beside smooth: of a scene of its own, so that others keep their bits.
+/// Kinds of glass other than smooth: in a separate scene, so that others keep their bits.
 constexpr const char* kGlasswareMaterials = R"(
   frosted: {type: rough_dielectric, ior: 1.5, roughness: 0.5}
   matt_flint: {type: rough_dielectric, ior: {glass: SF10}, roughness: 0.3}
@@ -198,7 +198,7 @@ void addManyLights(crt::Scene& scene) {
     }
 }
 
-/// Of random words, made anew for each compilation: any texel is a value.
+/// Of random words, made again for each compilation: any texel is a value.
 std::shared_ptr<const crt::TextureImage> randomImage(std::uint32_t width, std::uint32_t height,
                                                      crt::TexelKind kind) {
     auto image = std::make_shared<crt::TextureImage>();
@@ -686,7 +686,7 @@ std::vector<StoredHash> storedHashes() {
     return all;
 }
 
-/// The file anew: its comments, other versions' lines, then those of this version.
+/// The new file: its comments, other versions' lines, then those of this version.
 void storeHashes(const std::string& path, const std::map<std::string, std::string>& rendered) {
     std::string text;
     std::istringstream lines{std::string(kStoredHashes)};
@@ -838,7 +838,7 @@ TEST_CASE("sample ranges add up, in any order", "[bits]") {
     merged.add(part(5, 12));
     CHECK(differingPixels(whole, merged) == 0);
     CHECK(merged.samples.text() == "0-24");
-    // Another range is another image: the comparison above could have failed.
+    // Another range gives another image: the comparison above could have failed.
     CHECK(differingPixels(whole, part(24, 24)) > 0);
 }
 

@@ -1,4 +1,4 @@
-// What an image says of its own error, against a scene whose answer is known.
+// The error that an image states, against a scene with a known result.
 #include "conformance.h"
 
 #include "base/statistics.h"

@@ -1,4 +1,4 @@
-// What files of JSON do with numbers that nobody should have written there.
+// Numbers in JSON files that no sane writer would produce.
 #pragma once
 
 #include "base/error.h"

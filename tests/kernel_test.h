@@ -1,5 +1,5 @@
-/// What the kernel's unit tests share: the kernel as plain C++, scenes made in memory, seeded numbers, and
-/// chi-squared.
+/// The shared parts of the kernel's unit tests: the kernel as plain C++, scenes made in memory, seeded
+/// numbers, and chi-squared.
 #pragma once
 
 #include "base/vec3d.h"
@@ -67,7 +67,7 @@ inline CrtRay rayOf(vec3 o, vec3 d, f32 reach = CRT_INFINITY) {
     return ray;
 }
 
-/// What crt_hash does, undone: its multipliers' inverses modulo 2^32, and its shifts in the other order.
+/// The inverse of crt_hash: its multipliers' inverses modulo 2^32, and its shifts in the other order.
 inline u32 unhash(u32 x) {
     const auto inverse = [](u32 odd) {
         u32 y = odd;

@@ -103,7 +103,7 @@ int kindOf(Body&& body) {
 struct Folder {
     std::filesystem::path path;
     Folder() {
-        // mkdtemp puts letters of its own for the last six.
+        // mkdtemp replaces the last six letters.
         std::string name =
             (std::filesystem::temp_directory_path() / ("libcrt-" + std::string(6, 'X'))).string();
         REQUIRE(mkdtemp(name.data()) != nullptr);

@@ -68,7 +68,7 @@ inline std::string zlibStream(const std::string& bytes) {
     return stream;
 }
 
-/// What a PNG begins with; `before` are whole chunks before its pixels.
+/// The beginning of a PNG; `before` are whole chunks before its pixels.
 inline std::string pngHeader(const PngKind& kind, const std::string& before = {}) {
     return "\x89PNG\r\n\x1a\n" +
            pngChunk("IHDR", bigEndian32(kind.width) + bigEndian32(kind.height) +

@@ -1,11 +1,11 @@
-/// How long something takes on processors, for what takes minutes where it is quadratic.
+/// Measures processor time, for work that takes minutes if it is quadratic.
 #pragma once
 
 #include <ctime>
 
 namespace crt::test {
 
-// Of all processors together. What runs under a sanitizer takes several times as long as it should.
+// Of all processors together. Work under a sanitizer takes several times as long as it should.
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 constexpr double kSecondsAllowed = 40;
 #else

@@ -1,4 +1,4 @@
-/// How tests read the errors of crt.
+/// Catches the errors of crt for tests.
 #pragma once
 
 #include "base/error.h"

@@ -1,4 +1,4 @@
-/// What a reader of files says of one that it refuses.
+/// The message of a reader of files about a file that it refuses.
 #pragma once
 
 #include "catch.h"

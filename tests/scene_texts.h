@@ -37,20 +37,20 @@ inline Error refusal(const std::string& yaml, const std::vector<SceneOverride>& 
     throw;
 }
 
-/// What is said about a scene whose second line onwards is `body`.
+/// The messages about a scene whose second line onwards is `body`.
 inline std::string refused(const std::string& body, const std::vector<SceneOverride>& overrides = {},
                            const std::string& directory = ".") {
     return refusal("crt: 1\n" + body, overrides, directory).what();
 }
 
-/// What the log says about a scene that is accepted.
+/// The log of a scene that is accepted.
 inline std::string saidOf(const std::string& body, const std::string& directory) {
     const CapturedLog log;
     parseScene("crt: 1\n" + body, "scene.yaml", directory, {});
     return log.text();
 }
 
-/// What is said about a reflectance.
+/// The messages about a reflectance.
 inline std::string refusedReflectance(const std::string& spectrum) {
     return refused("materials:\n  m: {type: diffuse, reflectance: " + spectrum + "}\n");
 }

@@ -12,7 +12,7 @@
 
 namespace crt::synthetic {
 
-/// How one pixel's samples scatter about their mean.
+/// Distribution of one pixel's samples about their mean.
 enum class Noise {
     Normal,     ///< As sums of many alike terms do.
     Skewed,     ///< Gamma: bounded below by 0, a long tail above.
@@ -30,10 +30,10 @@ struct Scenario {
     double relative_noise = 0.1;   ///< Standard error of the median pixel over its mean.
     std::uint32_t width = 64, height = 64;
     bool coloured =
-        false;  ///< R and B have noise of their own, and G the mean of both; else they are equal.
+        false;  ///< R and B have independent noise, and G the mean of both; else they are equal.
 };
 
-/// What a planted error does to the expectation.
+/// Effect of a planted error on the expectation.
 struct Planted {
     double everywhere = 0;  ///< Relative.
     double one_tile = 0;    ///< Relative, of the tile of 8 × 8 pixels at (16, 8).
@@ -43,8 +43,8 @@ class Maker {
 public:
     explicit Maker(std::uint64_t seed) : random_(seed), seed_(seed) {}
 
-    /// R = G = B with StdError.Y and its degrees of freedom. `quality` divides the variance, as so many
-    /// times the samples would.
+    /// R = G = B with StdError.Y and its degrees of freedom. `quality` divides the variance, as that factor
+    /// more samples would.
     Image image(const Scenario& s, const Planted& planted = {}, double quality = 1) {
         Image image;
         image.width = s.width;

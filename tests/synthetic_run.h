@@ -21,7 +21,7 @@ struct SyntheticRender {
     double bias = 0;        ///< b: of every pixel, alternately up and down, so that the image mean is right.
     double mean_bias = 0;   ///< Of every pixel, the same way.
     double rate = 1;        ///< Variance falls as N^−rate; 1 is independent sampling.
-    double turns_at = 1e300;  ///< From so many samples on it falls as 1/N again.
+    double turns_at = 1e300;  ///< From this number of samples on it falls as 1/N again.
     double launch_seconds = 0.02, seconds_per_sample = 0.003;
     double before_first_sample = 0.4, start_jitter = 0.02;  ///< Mean, and relative standard deviation.
     /// Of the variance 90 % come from paths as rare as this, of lognormal brightness; 0: normal noise alone.
@@ -112,7 +112,8 @@ inline ErrorMetrics syntheticMetrics(double mse) {
     return error;
 }
 
-/// Sum over so many samples, of mean 0 and this variance a sample: a Poisson number of lognormal values.
+/// Sum over this number of samples, of mean 0 and this variance a sample: a Poisson number of lognormal
+/// values.
 inline double syntheticFireflies(double probability, double variance, double samples,
                                  std::mt19937_64& engine) {
     if (!(probability > 0)) return 0;

@@ -1,4 +1,4 @@
-// How bright the brightest paths of a scene are: against arithmetic, and whatever stores the surfaces.
+// Brightness of the brightest paths of a scene: against arithmetic, for every storage of the surfaces.
 #include "catch.h"
 
 #include "captured_log.h"

@@ -1,6 +1,5 @@
-// What every material must keep, whatever it is: asked of crt_layered_prepare, _sample, _eval and _pdf of
-// each kind in CRT_MATERIAL_LIST. A new material is a line in kSubjects. Backends are held to the same bits
-// elsewhere.
+// Invariants of every material: tests crt_layered_prepare, _sample, _eval and _pdf of each kind in
+// CRT_MATERIAL_LIST. A new material is a line in kSubjects. Backends are held to the same bits elsewhere.
 //
 // Over 450 lines: one list of materials, and the laws that each of them is asked for.
 #include "kernel_test.h"
@@ -144,9 +143,9 @@ struct Subject {
     /// The share of it that goes into single directions, beside a lobe.
     std::function<double(double)> single = [](double) { return 0.0; };
     bool reciprocal = true;
-    /// Whether what is left of light depends on where it comes from.
+    /// True if the remaining light depends on its direction.
     bool tinted = false;
-    u32 numbers = 512;  ///< The square of so many makes its means: more where weights differ much.
+    u32 numbers = 512;  ///< The square of this number makes its means: more where weights differ much.
 };
 
 /// All that the tests ask of, one line each.
@@ -658,7 +657,7 @@ TEST_CASE("BSDF: the way back is as bright as the way there", "[kernel][bsdf][ma
             if (std::abs(wi[2]) < 0.01) continue;
             const CrtBsdf back = bench.prepare(wi);
             for (u32 l = 0; l < 4; ++l) {
-                // What arrives is compressed by the index on its side, squared.
+                // The arriving light is compressed by the index on its side, squared.
                 const double square = indexSquare(s.material, l);
                 const double a = lane(crt_layered_eval(&there, unitFloat(wi)), l) / std::abs(wi[2]) *
                                  (wi[2] < 0 ? square : 1),
@@ -710,7 +709,8 @@ TEST_CASE("BSDF: in white light everything is as bright as its albedo says, and 
 }
 
 TEST_CASE("BSDF: directions follow the wavelengths that the path carries", "[kernel][bsdf][materials]") {
-    // What no wavelength carries is not looked for; each wavelength's mean does not depend on the others.
+    // Wavelengths that carry nothing are not looked for; each wavelength's mean does not depend on the
+    // others.
     const Bench bench(roughGlass(1.9, 1.4, 0.4));
     const Vec3d wo = spherical(0.7, 0.3);
     std::array<double, 3> passed{};

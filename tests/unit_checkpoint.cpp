@@ -183,7 +183,7 @@ class PlaneReader {
 public:
     explicit PlaneReader(std::span<const unsigned char> packed) : rest_(packed) {}
 
-    /// Whether what follows is these records, of so many bytes each.
+    /// True if the rest consists of these records, of this size each.
     template <class Value>
     bool holds(const std::vector<Value>& values, std::size_t records) {
         const auto* bytes = reinterpret_cast<const unsigned char*>(values.data());
@@ -241,7 +241,7 @@ TEST_CASE("films are packed without loss, in blocks, into less", "[checkpoint]")
     const std::size_t raw = film.sums.size() * 8 + film.counts.size() * 8 + film.primitives.size() * 4;
     CHECK(packed.size() < raw / 5);  // 8 of 92 bytes are noise, and 10 bits of another 8.
     CHECK(leastPackedBytes(film.shape()) < packed.size());
-    // What packs and what unpacks could agree on another order than that of earlier films.
+    // Packing and unpacking could agree on an order other than that of earlier films.
     PlaneReader planes(packed);
     CHECK(planes.holds(film.sums, film.counts.size()));
     CHECK(planes.holds(film.counts, film.counts.size()));
@@ -253,7 +253,7 @@ TEST_CASE("films are packed without loss, in blocks, into less", "[checkpoint]")
     CHECK(back.counts == film.counts);
     CHECK(back.primitives == film.primitives);
 
-    // What is not a film of this shape is refused, wherever it ends and whatever it holds.
+    // A file that is not a film of this shape is refused, wherever it ends and whatever it holds.
     for (std::size_t size = 0; size < packed.size(); size += 1 + packed.size() / 200)
         CHECK_FALSE(unpackFilm(std::span(packed).first(size), back));
     std::vector<unsigned char> longer = packed;
@@ -277,7 +277,7 @@ TEST_CASE("a checkpoint is written beside the render, and its failures are told"
         Film film = randomFilm(kShape, {0, 8}, 11);
         const Film first = film;
         writer.save(film, kIdentity);
-        film.sums.assign(film.sums.size(), 0.0);  // What happens to the film afterwards does not show.
+        film.sums.assign(film.sums.size(), 0.0);  // Later changes of the film are not visible.
         writer.finish();
         CHECK(writer.idle());
         CHECK(sameBits(readCheckpoint(path).first.sums, first.sums));
@@ -473,7 +473,7 @@ TEST_CASE("films of other bits are neither gone on with nor merged", "[checkpoin
                                ", rendered by crt 0.1.0, and version " + version + " is expected"));
     CHECK_THROWS_WITH(mergeCheckpoints({now, then}),
                       Contains("bits versions " + version + " and " + before));
-    // Sums of one version add up, whoever adds them; they stay what they are.
+    // Sums of one version add up, whatever adds them; they stay what they are.
     CHECK(mergeCheckpoints({then, later}).second.bits_version == CRT_BITS_VERSION - 1);
 }
 

@@ -224,7 +224,7 @@ TEST_CASE("images of other exposure, white balance or colour space are not compa
         const CompareResult supposed = compareImages(silent, *other);
         CHECK(supposed.mismatch.empty());
         REQUIRE(supposed.notes.size() == 1);
-        CHECK_THAT(supposed.notes[0], Contains("A does not say its") && Contains("taken as that of B"));
+        CHECK_THAT(supposed.notes[0], Contains("A does not state its") && Contains("assumes that of B"));
         CHECK_THAT(compareText(supposed), Contains("note") && Contains(supposed.notes[0]));
         CHECK(nlohmann::json::parse(compareJson(supposed))["notes"].size() == 1);
         CHECK(supposed.same);

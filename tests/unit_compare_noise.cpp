@@ -110,7 +110,7 @@ TEST_CASE("an image's noise is read from what it carries", "[compare-noise]") {
         variance.pixels.insert(variance.pixels.end(), {1, 1, 1, 0.25f});
     CHECK(noisyImage(variance, NoiseOf::Luminance)->variances[7] == 0.25);
     CHECK_FALSE(noisyImage(variance, NoiseOf::Color));
-    variance.pixels[3] = std::numeric_limits<float>::infinity();  // What one sample knows of itself.
+    variance.pixels[3] = std::numeric_limits<float>::infinity();  // The noise estimate of one sample.
     CHECK_FALSE(noisyImage(variance, NoiseOf::Luminance));
 }
 
@@ -144,8 +144,8 @@ TEST_CASE("noise alone is no bias, and z says that it is noise", "[compare-noise
         for (const ChannelBias& c : n.channels) {
             covered += c.interval.contains(0);
             // 960 pixels of 15 degrees of freedom each: next to the normal quantile, not the 4.07 of one
-            // pixel; or, where the differences scatter so much, that of sums which are known to be symmetric
-            // and no more (3.605).
+            // pixel; or, where the differences scatter strongly, that of sums which are known to be
+            // symmetric and no more (3.605).
             const double standard_error = kNoise * std::sqrt(2.0 / 960);
             CHECK(c.interval.halfWidth() > 3.2905 * standard_error * (1 - 2e-3));
             CHECK(c.interval.halfWidth() < 3.605 * standard_error * 1.15);
@@ -250,8 +250,8 @@ TEST_CASE("words, figures and JSON of a noise comparison agree in every branch",
     Image plain = blank({"R", "G", "B"}, "9");
     plain.pixels.assign(std::size_t{3} * kWidth * kHeight, 2.0f);
     for (const auto& [first, second, why] : {std::tuple{&a, &a, "both have seed 1"},
-                                             {&lost, &b, "A does not know the noise of all"},
-                                             {&b, &lost, "B does not know the noise of all"}}) {
+                                             {&lost, &b, "A lacks the noise of some"},
+                                             {&b, &lost, "B lacks the noise of some"}}) {
         const NoiseComparison noise = compareNoise(*first, *second);
         CHECK_THAT(noise.unknown, Contains(why));
         CHECK(noise.channels.empty());
@@ -285,7 +285,7 @@ TEST_CASE("words, figures and JSON of a noise comparison agree in every branch",
     CHECK_THAT(text.substr(text.find("Noise or bias?")),
                Contains("more than noise") && !Contains("nan") && !Contains("inf"));
 
-    // What differs by rounding alone is no bias, though no noise explains it.
+    // A difference by rounding alone is no bias, though no noise explains it.
     Image rounded = plain;
     rounded.metadata = {{"crt/seed", "11"}};
     for (Image* image : {&rounded, &plain}) {
@@ -323,7 +323,7 @@ TEST_CASE(
           Approx(*compareImages(a, withFolds(3, reference_noise)).relative_rmse));
     CHECK(of_a.warnings.empty());
 
-    // The spread, against that of references made anew.
+    // The spread, against that of newly made references.
     std::vector<double> means;
     for (std::uint64_t seed = 10; seed < 60; ++seed)
         means.push_back(

@@ -1,4 +1,4 @@
-// Scene → blob: which features a scene asks for, and what is said to be left out.
+// Scene → blob: the features that a scene needs, and those that are reported as left out.
 #include "compiled_scenes.h"
 
 #include "base/error.h"
@@ -175,7 +175,7 @@ TEST_CASE("every feature bit is set by some scene, and by nothing else", "[compi
         coated(0, 1.5)(s);
         for (crt::Material& m : s.materials) m.type = crt::MaterialType::Mirror;
     });
-    // What transmits has none.
+    // Transmitting materials have none.
     differs(CRT_FEATURE_DIELECTRIC, 0, [&](Scene& s) {
         other(crt::MaterialType::Dielectric)(s);
         coated(0, 1.5)(s);
@@ -249,7 +249,7 @@ TEST_CASE("every feature bit is set by some scene, and by nothing else", "[compi
         differs(CRT_FEATURE_VIEW, light, [](Scene& s) { s.integrator.type = crt::IntegratorType::Normals; });
     seen |= differs(CRT_FEATURE_VIEW, light | CRT_FEATURE_BRUTE_FORCE,
                     [](Scene& s) { s.integrator.type = crt::IntegratorType::Aabb; });
-    const auto many = [](Scene& s) {  // each quad in a place of its own
+    const auto many = [](Scene& s) {  // each quad in a separate place
         s.objects[1].transforms.resize(crt::kLightTreeLights, crt::kIdentity4d);
         for (std::size_t i = 0; i < crt::kLightTreeLights; ++i)
             s.objects[1].transforms[i][3] = 3.0 * static_cast<double>(i);

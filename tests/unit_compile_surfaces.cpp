@@ -109,7 +109,7 @@ TEST_CASE("lengths are moved and scaled exactly", "[compile]") {
         CHECK(std::memcmp(a.data(), b.data(), a.size() * sizeof(CrtTriangle)) == 0);
         CHECK(std::memcmp(&headerOf(here).camera, &headerOf(scaled).camera, sizeof(CrtCamera)) == 0);
     }
-    // Whatever the lengths, coordinates fill [−1, 1] by half at least.
+    // For all lengths, coordinates fill [−1, 1] by half at least.
     Random random(43);
     for (int i = 0; i < 50; ++i) {
         const double scale = std::pow(10.0, random.uniform(-30, 30));

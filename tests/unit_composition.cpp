@@ -28,7 +28,7 @@ std::string sceneWith(const std::string& materials) {
     return fmt::format("crt: 1\nmaterials:\n{}{}{}", kParts, materials, kSheet);
 }
 
-/// What is wrong with a scene; empty: nothing.
+/// The errors of a scene; empty: none.
 std::string refusal(const std::string& materials) {
     try {
         (void)crt::parseScene(sceneWith(materials), "scene.yaml", "");
@@ -92,7 +92,7 @@ TEST_CASE("mix: each material is found as often as the amounts say", "[compositi
 
     CHECK(Sheet("  m: {type: mix, materials: [a, b], amount: 0}\n").share("a", kFromFront) == 1);
     CHECK(Sheet("  m: {type: mix, materials: [a, b], amount: 1}\n").share("b", kFromFront) == 1);
-    // What a choice leaves of the number never falls on a share of 0 or beyond one of 1.
+    // The rest of the number after a choice never falls on a share of 0 or beyond one of 1.
     const Sheet sure(
         "  x: {type: mix, materials: [b, c], amount: 0}\n  y: {type: mix, materials: [c, b], amount: 1}\n"
         "  m: {type: mix, materials: [x, y], amount: 0.3}\n");
@@ -117,7 +117,7 @@ TEST_CASE("opacity: rays pass as often as it says, and go on behind the surface"
         CrtContext ctx = sheet.ctx;
         double stopped = 0;
         constexpr std::uint64_t kSamples = 1u << 14;
-        if (opacity == 1) {  // nothing in the scene is composed, and nobody asks
+        if (opacity == 1) {  // nothing in the scene is composed, and nothing needs it
             CHECK(ctx.scene->compositions.count == 0);
             continue;
         }

@@ -1,4 +1,4 @@
-// What a film knows of its scene (film_record.h), and what becomes of it in files.
+// The record of a film about its scene (film_record.h), and its use in files.
 #include "catch.h"
 #include "compile/compile.h"
 #include "film/checkpoint.h"
@@ -255,12 +255,12 @@ TEST_CASE("whatever makes a film another one is said in words", "[develop]") {
         {{"camera.position", "[1, 2, -4.0000001]"}, "not at (1, 2, -4.0000001)"},
         {{"camera.aperture_radius", "0.1"}, "lens of radius 0.1"},
         {{"objects.0.mesh.positions.0.0", "-2.5"},
-         "the geometry is another (4 triangles in 2 objects in both)"},
-        {{"objects.0.transform", "[{translate: [0, 0.5, 0]}]"}, "the geometry is another"},
-        {{"objects.0.material", "glass"}, "the geometry is another"},
-        {{"materials.floor.reflectance", "0.6"}, "the materials are others (2 materials in both)"},
-        {{"spectra.glow.scale", "6"}, "the light is another"},
-        {{"objects.1.emission.two_sided", "true"}, "the light is another"},
+         "the geometry differs (4 triangles in 2 objects in both)"},
+        {{"objects.0.transform", "[{translate: [0, 0.5, 0]}]"}, "the geometry differs"},
+        {{"objects.0.material", "glass"}, "the geometry differs"},
+        {{"materials.floor.reflectance", "0.6"}, "the materials differ (2 materials in both)"},
+        {{"spectra.glow.scale", "6"}, "the light differs"},
+        {{"objects.1.emission.two_sided", "true"}, "the light differs"},
         {{"environment", "{radiance: 1}"},
          "the light is 1 kind of lamp, no environment, not 1 kind of lamp, an environment"},
         {{"outputs.0.aovs", "[normal]"}, "the AOVs of first hits are depth, not normal"},
@@ -274,7 +274,7 @@ TEST_CASE("whatever makes a film another one is said in words", "[develop]") {
         for (const std::string& difference : differences) all += difference + "; ";
         CHECK_THAT(all, Contains(words));
     }
-    // What no sample depends on is no difference.
+    // Settings that do not affect samples are no difference.
     for (const SceneOverride& change : {SceneOverride{"film.exposure_ev", "2"},
                                         {"film.color_space", "xyz"},
                                         {"title", "other"},
@@ -338,7 +338,7 @@ TEST_CASE("a material that makes a film another one is given as the reason, what
               compileScene(scene, requestedAovs(scene)).hash);
         const std::vector<std::string> differences = differingTraits(recordOf(scene), recordOf(other));
         REQUIRE(differences.size() == 1);
-        CHECK_THAT(differences[0], Contains("the materials are others"));
+        CHECK_THAT(differences[0], Contains("the materials differ"));
     }
 }
 

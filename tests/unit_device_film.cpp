@@ -41,7 +41,7 @@ struct Run {
     explicit Run(const std::string& device = "")
         : group(backend, {.device = device}, probeDevices(backend)) {}
 
-    /// What the scene and so many rows of its film take.
+    /// Memory of the scene and of this number of rows of its film.
     std::string roomFor(std::uint32_t rows) const {
         const std::uint64_t channels = compiled.header().channels;
         return std::to_string(compiled.size_bytes +

@@ -1,5 +1,5 @@
 // error_estimate.h: variances against the textbook, intervals against their promised coverage, and the
-// replicates of the Sobol sampler, which must be sequences of their own.
+// replicates of the Sobol sampler, which must be independent sequences.
 //
 // Over 450 lines: one estimate, asked for bias, coverage and independence with the same noise.
 #include "film/error_estimate.h"
@@ -26,7 +26,7 @@ using kernel::u64;
 
 namespace {
 
-/// A film for 2^shift replicates, whose last has no channel of its own.
+/// A film for 2^shift replicates, whose last has no separate channel.
 FilmShape shapeFor(u32 width, u32 height, u32 shift) {
     const u32 aovs = shift > 0 ? kAovReplicates : kAovSquares;
     return {width, height, channelsFor(aovs, 1u << shift), aovs};
@@ -234,7 +234,7 @@ TEST_CASE("intervals of normal noise cover what they promise", "[error]") {
     CHECK(c.ratio == Approx(1).epsilon(width == 1 ? 0.05 : 0.03));
 }
 
-// What ignored kurtosis: an interval from the normal distribution covers 28 % here.
+// An estimate without kurtosis: an interval from the normal distribution covers 28 % here.
 TEST_CASE("intervals know long tails", "[error]") {
     // One sample in 500 carries 500 times the light: each pixel sees one in two images of 256 samples.
     constexpr double kChance = 1.0 / 500;
@@ -313,7 +313,8 @@ TEST_CASE("an image that has met few of its scene's brightest paths does not kno
     struct Counts {
         int known = 0, covered = 0, within = 0;
     };
-    // Images with so many of those paths on average, asked with what is known of the scene and without it.
+    // Images with this number of those paths on average, estimated with and without the known facts of the
+    // scene.
     const auto ask = [&](double expected) {
         std::array<Counts, 2> counts;
         std::poisson_distribution<int> paths(expected);
@@ -380,7 +381,7 @@ TEST_CASE("intervals contain what was not met", "[error]") {
     CHECK(covered >= 0.93 * known);
 }
 
-// What looked at the differences between neighbours alone never narrows: 6 pixels of different brightness.
+// An estimate from the differences between neighbours alone never narrows: 6 pixels of different brightness.
 TEST_CASE("of one sequence of independent samples an interval narrows with their number", "[error]") {
     const std::vector<double> brightness{0.5, 1, 2, 3, 5, 8};
     constexpr std::size_t kPixels = 40;
@@ -417,13 +418,13 @@ TEST_CASE("of one sequence of independent samples an interval narrows with their
     const ErrorEstimate many = estimate(16 * kFew);
     INFO(covered << " of " << kImages << ", relative width " << width);
     CHECK(covered >= 0.9 * kImages);  // 180 of 200 at 95 %: fewer in one of 400 runs.
-    CHECK(width < 1);                 // How six pixels differ gives 1.5.
+    CHECK(width < 1);                 // The differences of six pixels give 1.5.
     CHECK(many.relative_rmse_95.upper / many.relative_rmse_95.lower - 1 == Approx(width / 4).epsilon(0.25));
 }
 
-// Which images know their error must not depend on how much light they happened to meet: where only those
-// with many bright paths do, they state too much on average: with a least of four degrees of freedom 1.12
-// times the error, where three paths an image are expected.
+// The set of images with a known error must not depend on the amount of light that they happened to meet: if
+// only those with many bright paths have one, they state too much on average: with a least of four degrees
+// of freedom 1.12 times the error, where three paths an image are expected.
 TEST_CASE("images that know their error are not a lucky choice", "[error]") {
     const double expected_paths = GENERATE(3, 4, 6);
     constexpr std::size_t kPixels = 32 * 32;

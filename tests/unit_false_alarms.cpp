@@ -20,7 +20,8 @@ using synthetic::Scenario;
 
 namespace {
 
-/// How often each kind of test rejects, at two levels. Adjusted p-values below a level are alarms at it.
+/// Rates at which each kind of test rejects, at two levels. Adjusted p-values below a level are alarms at
+/// it.
 struct Alarms {
     static constexpr std::array<double, 2> kLevels{0.05, 0.001};
     std::array<int, 2> mean{}, tiles{}, pixels{}, squares{}, colour{};

@@ -33,7 +33,7 @@ Film oneSample(std::uint64_t index, float x, float y, float z) {
     return film;
 }
 
-/// What a path tracer returns: mostly small, now and then a firefly; the Pareto tail has no finite mean.
+/// The values of a path tracer: mostly small, now and then a firefly; the Pareto tail has no finite mean.
 std::vector<float> heavyTailed(std::size_t count, std::uint32_t seed) {
     std::mt19937 generator(seed);
     std::uniform_real_distribution<double> uniform(1e-12, 1.0);
@@ -307,7 +307,7 @@ TEST_CASE(
             scene.film.color_space = space;
             scene.film.white_balance = *light != 0 ? illuminantSpectrum(light) : std::nullopt;
             const stats::Rgb weights = stats::luminanceWeights(space);
-            // The same by resolving every sample as an image of its own.
+            // The same by resolving every sample as a separate image.
             std::vector<double> luminances;
             for (const double b : brightness) {
                 const Image one = resolveImage(filmOf({color[0] * b, color[1] * b, color[2] * b}),

@@ -21,7 +21,7 @@ ConfigurationFit fitOf(const SyntheticRender& what, std::uint64_t seed, const Fi
     return analyze(syntheticRun(what, seed), options).fits.at(0);
 }
 
-/// How often each named interval covers its truth.
+/// Rates at which each named interval covers its truth.
 struct Coverage {
     int repeats = 0;
     std::map<std::string, int> covered;

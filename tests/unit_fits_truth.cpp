@@ -1,4 +1,4 @@
-// What converge says where the truth is known by construction: noisy references, unequal pixels, few
+// The statements of converge where the truth is known by construction: noisy references, unequal pixels, few
 // replicates, colours beyond the gamut. bench/false_alarms.cpp asks the same of more situations, more often.
 #include "catch.h"
 #include "film/error_text.h"
@@ -141,7 +141,7 @@ TEST_CASE("an error below the noise of the reference is bounded, not a NaN", "[f
         CHECK(fit.judgement.verdict != stats::Verdict::Fail);
     }
     CHECK(covered >= 16);  // Of 20 intervals of 95 %: fewer are a chance of 0.3 %.
-    CHECK(at_zero > 0);    // Where a logarithm would have been a NaN.
+    CHECK(at_zero > 0);    // A logarithm would be a NaN there.
 }
 
 // The reference's mean is known from eight folds: a normal quantile misses 1.2 % where 0.1 % is stated.

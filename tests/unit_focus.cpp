@@ -204,7 +204,7 @@ TEST_CASE("pieces keep coordinates, normals and materials of their triangle", "[
 }
 
 TEST_CASE("shapes keep their area, however far from the centre they stand", "[compile][focus][shapes]") {
-    // What rays meet and what light sampling counts are the same record.
+    // Rays and light sampling use the same record.
     for (const double far : {0.0, 1e3, 1e5, 1e7})
         for (const crt::QuadricType type :
              {crt::QuadricType::Disk, crt::QuadricType::Cylinder, crt::QuadricType::Sphere}) {

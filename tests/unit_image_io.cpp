@@ -72,7 +72,7 @@ Image fullImage() {
 
 bool mapsOpenImageIO() { return slurp("/proc/self/maps").find("libOpenImageIO") != std::string::npos; }
 
-/// Runs one hidden test case of `program` in a process of its own, where nothing has been loaded yet.
+/// Runs one hidden test case of `program` in a separate process, where nothing has been loaded yet.
 bool runAlone(const std::string& program, const char* tag, const std::string& environment = "") {
     return std::system((environment + " '" + program + "' '" + tag + "' >/dev/null 2>&1").c_str()) == 0;
 }
@@ -251,7 +251,7 @@ TEST_CASE("an EXR says nothing that the caller did not", "[image_io]") {
     const std::string path = directory / "image.exr";
     writeImage(path, OutputFormat::Exr, rgbImage(1, 1, {1, 2, 3}));
     const std::string bytes = slurp(path);
-    // Who, where and how are private unless they were handed in, and the same image is the same file.
+    // User, place and command are private unless they are passed in, and the same image is the same file.
     CHECK(metadataValue(readImage(path), "DateTime").empty());
     CHECK(bytes.find(directory.path()) == std::string::npos);
     CHECK(bytes.find("HostComputer") == std::string::npos);
@@ -444,7 +444,7 @@ TEST_CASE("unwritable outputs are found before anything is rendered", "[image_io
         fs::permissions(directory.path(), fs::perms::owner_read | fs::perms::owner_exec);
         CHECK_THROWS_WITH(checkWritable(directory / "image.exr"), Contains("Permission denied"));
     }
-    // Nobody, root included, may create files here.
+    // No user, root included, may create files here.
     for (const char* path : {"/proc/crt-image.exr", "/proc/crt-image.pfm"}) {
         try {
             writeImage(path, *formatOfFile(path), rgbImage(1, 1, {1, 1, 1}));

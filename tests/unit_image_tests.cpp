@@ -26,7 +26,7 @@ private:
     std::mt19937_64 bits_;
 };
 
-/// Where and how much an estimator is wrong.
+/// Place and size of an estimator's error.
 struct Bias {
     std::uint32_t x0 = 0, y0 = 0, x1 = 0, y1 = 0;
     double factor = 1;
@@ -57,7 +57,7 @@ TEST_CASE("means and moments of replicates are those of all their values", "[ima
     Replicates replicates(9, 9, 1);
     for (const double level : {1.0, 3.0, 8.0}) {
         std::vector<double> image(81, level);
-        image[80] = 10 * level;  // The last pixel is a tile of its own.
+        image[80] = 10 * level;  // The last pixel is a separate tile.
         replicates.add(image);
     }
     CHECK(replicates.tilesAcross() == 2);

@@ -1,4 +1,4 @@
-// What `crt import` makes of a model: the scene reads back as the model itself does, and materials,
+// The result of `crt import` for a model: the scene reads back as the model itself does, and materials,
 // textures, lights and cameras are what the formats say.
 #include "imported.h"
 

@@ -1,4 +1,4 @@
-// What a scene cannot say as a glTF file does, and what the import makes of it: alpha of vertices, tangents,
+// Features of a glTF file that a scene cannot express, and their import: alpha of vertices, tangents,
 // specular and glossiness, and lights that would leave the image black.
 #include "imported.h"
 
@@ -43,7 +43,8 @@ TEST_CASE("The alpha of vertices is opacity where the material has some", "[gltf
     CHECK_THAT(lost.log, Contains("the alpha of vertices together with a texture"));
 }
 
-// Fails when tangents are not read, or those that exporters make of the coordinates are told as others.
+// Fails when tangents are not read, or those that exporters make of the coordinates are reported as
+// different.
 TEST_CASE("Tangents that are not those of the texture coordinates are a loss", "[gltf][import]") {
     const auto lossOf = [](const std::vector<float>& tangents, bool mapped = true) {
         Json material = Json::object();

@@ -242,7 +242,7 @@ TEST_CASE("surfaces of instances are those of the flattened scene but for roundi
         REQUIRE(flat_ctx.scene->instances.count == 0);
         const std::vector<u32> flat_slots = slotsById(flat_ctx);
         const auto* instances = CRT_ARRAY(CrtInstance, ctx.blob, ctx.scene->instances);
-        // What is numbered between the triangles that stand for themselves and those of instances.
+        // Numbers between the triangles that stand for themselves and those of instances.
         const u32 between = 1 + ctx.scene->instances.count;
         // γ(8) of a scene within ±1, and of the mesh that is placed in it, in the author's units.
         const double rounding = 8 * 0x1p-24 * 3 * std::ldexp(1.0, -instanced.scale_exponent);
@@ -363,7 +363,7 @@ TEST_CASE("no path leaves an instance that is closed, and none meets the wall th
 
 namespace {
 
-/// An object of so many triangles, in so many places.
+/// An object with this number of triangles, in this number of places.
 Scene placed(std::size_t triangles, std::size_t places, Sharing sharing) {
     Scene scene = sceneOf(Mesh{});
     scene.meshes[0].positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};

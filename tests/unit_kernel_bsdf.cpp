@@ -1,4 +1,4 @@
-// How surfaces scatter and lights are sampled, and which wavelengths a path carries: closed forms, complex
+// Scattering by surfaces, sampling of lights, and the wavelengths of a path: closed forms, complex
 // arithmetic in long double, chi-squared against the density that is claimed, and expectations that must
 // come out whatever the density.
 //
@@ -339,8 +339,8 @@ TEST_CASE("solid angles of triangles, down to 1e-8 sr", "[kernel][light]") {
                        unitFloat({-0.5, -0.9, 1e-3})) == Approx(2 * kPi).margin(2e-2));
     CHECK(solidAngleOf(make_vec3(0, 0, 1), make_vec3(0, 0, 1), make_vec3(1, 0, 0)) == 0);
 
-    // Of the same rounded directions, in long double. What is left is the rounding of the triple product,
-    // 1e-7 of the triangle's width.
+    // Of the same rounded directions, in long double. The rest is the rounding of the triple product, 1e-7
+    // of the triangle's width.
     Random random(35);
     for (const double width : {1.0, 1e-1, 1e-2, 1e-3, 1e-4}) {
         double worst = 0;

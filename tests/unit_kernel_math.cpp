@@ -140,7 +140,7 @@ TEST_CASE("a difference of products has the exact sign, and an error of at most 
     CHECK(wrong_signs == 0);
     CHECK(worst <= 1.5);
     CHECK(zeros > 1000);
-    // What a plain evaluation gets wrong: (1 + 2^-12)² − (1 + 2^-11) = 2^-24.
+    // A case in which a plain evaluation is wrong: (1 + 2^-12)² − (1 + 2^-11) = 2^-24.
     CHECK(crt_difference_of_products(1 + 0x1p-12f, 1 + 0x1p-12f, 1 + 0x1p-11f, 1.0f) == 0x1p-24f);
 }
 
@@ -277,7 +277,7 @@ TEST_CASE("long sums are exact, in any order", "[kernel][math]") {
     const __int128 error =
         static_cast<__int128>(s.hi * 0x1p60) + static_cast<__int128>(s.lo * 0x1p60) - exact;
     CHECK(std::abs(static_cast<double>(error)) * 0x1p-60 <= 1000 * 0x1p-106 * magnitude);
-    // What a plain sum loses.
+    // The loss of a plain sum.
     const CrtSum tiny = crt_sum_add(crt_sum_add(crt_sum_add(CrtSum{0, 0}, 1e16), 1.0), -1e16);
     CHECK(tiny.hi + tiny.lo == 1.0);
 }

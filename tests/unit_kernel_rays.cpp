@@ -1,8 +1,8 @@
 // Rays against triangles, alone, eight at a time, through boxes and trees: nothing leaks through an edge,
 // nothing is culled that would be hit, and a ray that leaves a surface meets neither it nor the world behind
-// the wall. An executable of its own, compiled for AVX2 like the kernels of the Embree backend.
+// the wall. A separate executable, compiled for AVX2 like the kernels of the Embree backend.
 //
-// Over 450 lines: an executable of its own, since it is compiled for another processor.
+// Over 450 lines: a separate executable, since it is compiled for another processor.
 #include "kernel_test.h"
 
 #include "compile/bvh_build.h"
@@ -120,7 +120,7 @@ CrtRay awkwardRay(const CrtContext& ctx, Random& random, bool like_a_path) {
     return rayOf(toFloat(o), like_a_path || random.bits() & 1 ? unitFloat(d) : toFloat(d));
 }
 
-/// How often tracing through the tree, the objects' boxes and eight triangles at a time differs from one
+/// Rate at which tracing through the tree, the objects' boxes and eight triangles at a time differs from one
 /// triangle after another.
 std::uint64_t disagreements(const ThreeWays& scene, Random& random, int rays, std::uint64_t* hits) {
     const CrtContext brute = contextOf(scene.brute), bvh = contextOf(scene.bvh),
@@ -146,8 +146,8 @@ std::uint64_t disagreements(const ThreeWays& scene, Random& random, int rays, st
 }
 
 /// Shadow rays, from above one triangle to just before another: how often one triangle after another and the
-/// four ways disagree. Of so many triangles one after another as lie in one plane, none is the target of
-/// another: a wall with all of the scene on one side is no occluder, for rays within its plane neither.
+/// four ways disagree. Of consecutive triangles in one plane, none is the target of another: a wall with all
+/// of the scene on one side is no occluder, for rays within its plane neither.
 std::uint64_t shadowDisagreements(const ThreeWays& scene, Random& random, int rays, std::uint64_t* hits,
                                   u32 in_one_plane = 1) {
     const CrtContext brute = contextOf(scene.brute), bvh = contextOf(scene.bvh),
@@ -706,7 +706,7 @@ crt::Matrix4d placed(const Vec3d& scale, const Vec3d& axis, double angle, const 
     return m;
 }
 
-/// A closed box whose six faces are quads of their own, facing inwards, the ceiling alight; and, where asked
+/// A closed box whose six faces are separate quads, facing inwards, the ceiling alight; and, where asked
 /// for, a triangle far away, or, outside of it but near (`far` below 0), a small one: then walls are large
 /// against what is there, and come in pieces.
 crt::Scene room(const Vec3d& scale, const Vec3d& axis, double angle, double far) {

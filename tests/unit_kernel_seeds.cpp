@@ -73,7 +73,7 @@ std::uint64_t pairsThatShare(const std::vector<std::uint64_t>& seeds, u32 log2_p
     return pairs;
 }
 
-/// How many of the sorted numbers are in both.
+/// Number of the sorted numbers that are in both.
 std::size_t common(const std::vector<u32>& a, const std::vector<u32>& b) {
     std::vector<u32> both;
     std::set_intersection(a.begin(), a.end(), b.begin(), b.end(), std::back_inserter(both));

@@ -1,5 +1,5 @@
 // The tree of lights: what its nodes hold, and that from any point every light that lights it can be chosen,
-// with the probability that the density of a ray that meets it is told.
+// with the probability that the density of a ray that meets it uses.
 #include "kernel_test.h"
 
 #include "compile/light_tree.h"
@@ -62,7 +62,7 @@ struct Tree {
     }
 };
 
-/// Whether light sampling finds the light from p, on the side of n, by many tries.
+/// True if light sampling finds the light from p, on the side of n, by many tries.
 bool lights(const Tree& tree, u32 index, vec3 p, vec3 n) {
     for (u32 i = 0; i < 24; ++i) {
         CrtSampler sampler = crt_sampler_begin(CRT_SAMPLER_INDEPENDENT, 0, crt_seed(5, 6), i, 0);
@@ -81,7 +81,7 @@ bool lights(const Tree& tree, u32 index, vec3 p, vec3 n) {
     return false;
 }
 
-/// What a node says of one of its children.
+/// A node's record of one of its children.
 struct Child {
     Vec3d centre, axis;
     double radius, power, theta_o, cos_e;
@@ -125,7 +125,7 @@ TEST_CASE("few lights have no tree, and many that lie at a place have one", "[li
     const auto few = static_cast<int>(crt::kLightTreeLights);
     CHECK(Tree(lamps(random, few - 1, true)).lights() == 0);
     CHECK(Tree(lamps(random, few, true)).lights() == crt::kLightTreeLights);
-    // A sun lies at no place, and keeps a share of its own.
+    // A sun lies at no place, and keeps a separate share.
     crt::Scene scene = lamps(random, few, true);
     crt::PointLight sun;
     sun.type = crt::PointLightType::Sun;

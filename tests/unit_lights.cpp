@@ -1,4 +1,4 @@
-// Lights without a surface: what their keys mean, in arithmetic of its own, what is refused, and how the
+// Lights without a surface: what their keys mean, in independent arithmetic, what is refused, and how the
 // kernel samples them.
 #include "base/log.h"
 #include "base/temporary_folder.h"
@@ -39,7 +39,7 @@ std::string refused(const std::string& body) {
 }
 std::string refusedLight(const std::string& light) { return refused("lights:\n  - " + light + "\n"); }
 
-/// Luminance of a spectrum by sums of its own.
+/// Luminance of a spectrum by separate sums.
 double lumens(const crt::Spectrum& s) {
     double sum = 0;
     for (std::size_t i = 0; i < crt::kSpectrumSize; ++i) sum += s[i] * crt::cieObserver()[1][i];

@@ -1,5 +1,5 @@
-// What comes from outside has bounds: files that never end, outputs that would destroy something,
-// geometry and light that arithmetic cannot carry. Of code: unit_trust.cpp.
+// Bounds of external input: files that never end, outputs that would destroy something, geometry and light
+// that arithmetic cannot carry. Of code: unit_trust.cpp.
 #include "base/atomic_file.h"
 #include "base/error.h"
 #include "base/input_file.h"
@@ -67,7 +67,7 @@ TEST_CASE("only regular files are read, and a pipe is not waited for", "[limits]
     CHECK_THROWS_WITH(loadScene(pipe), Contains("write '-' for standard input"));
     const std::string mesh =
         folder.write("mesh.obj", "mtllib pipe\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n");
-    // Ends: who waited for a writer of the pipe would wait for ever.
+    // Ends: a wait for a writer of the pipe would never end.
     refusal([&] { loadObj(mesh); });
 }
 

@@ -65,8 +65,8 @@ TEST_CASE("a plugin that is not there", "[loader]") {
                Contains("there is no backend file /nowhere/crt_backend_x.so"));
     CHECK_THAT(refusal(""), Contains("the backend has no name"));
 
-    // A name that crt knows is not a spelling mistake. Those that were built beside this program are found
-    // in any case.
+    // A name that crt knows is not a spelling mistake. Those that were built next to this program are always
+    // found.
     const TemporaryFolder empty;
     const ScopedVariable path("CRT_BACKEND_PATH", empty.path());
     for (const std::string name : {"cuda", "embree", "opencl"}) {
@@ -198,7 +198,7 @@ TEST_CASE("the kernel cache directory", "[loader]") {
     CHECK(makeHost(false).cache_directory == nullptr);
     REQUIRE(makeHost(true).cache_directory != nullptr);
     CHECK(makeHost(true).cache_directory == base / "xdg/crt");
-    // What is cached is run: no other user may write there.
+    // Cached kernels are executed: no other user may write there.
     CHECK((fs::status(base / "xdg/crt").permissions() & fs::perms::all) == fs::perms::owner_all);
     {
         const ScopedVariable relative("XDG_CACHE_HOME", "relative");

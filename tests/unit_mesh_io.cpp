@@ -233,7 +233,7 @@ TEST_CASE("triangles without area are dropped and counted", "[mesh_io]") {
     CHECK(m.mesh.triangles.size() == 1);
     CHECK(m.degenerate_faces == 2);
     CHECK(log.warnings() == 1);
-    // A file of nothing else is sound; who shows it decides what that means.
+    // A file of nothing else is sound; its user decides what that means.
     for (const char* only : {"f 1 1 2\n", "v 1 2 x\nf 1 1 2\n"}) {
         const LoadedMesh nothing = loadText(kTriangle + only);
         CHECK(nothing.mesh.triangles.empty());
@@ -247,7 +247,7 @@ TEST_CASE("triangles without area are dropped and counted", "[mesh_io]") {
     CHECK(loadText("v 0 0 0\nv 1e200 0 0\nv 0 1e200 0\nf 1 2 3\n").mesh.triangles.size() == 1);
 }
 
-// Found by fuzzing: asking whether a file of such a name exists is an error of its own, which came out as
+// Found by fuzzing: asking whether a file of such a name exists is a separate error, which came out as
 // std::filesystem::filesystem_error.
 TEST_CASE("an mtllib whose name no file can have is missing like others", "[mesh_io][mtl]") {
     const CapturedLog log;

@@ -1,4 +1,4 @@
-// What reaches people: errors, log lines and stages quote files, and must stay text whatever these hold.
+// Texts for users: errors, log lines and stages quote files, and must stay text whatever these hold.
 #include "base/error.h"
 #include "base/log.h"
 #include "base/stage.h"

@@ -1,5 +1,5 @@
-// What microfacets lose, and what comes of it: the tables of the compiler of scenes against quadrature and
-// against random walks on Smith's surface, which know neither.
+// The energy loss of microfacets, and its compensation: the tables of the compiler of scenes against
+// quadrature and against random walks on Smith's surface, which know neither.
 #include "kernel_test.h"
 
 #include "compile/compensation.h"
@@ -22,7 +22,7 @@ class Walk {
 public:
     Walk(double alpha, std::uint32_t seed) : alpha_(alpha), random_(seed) {}
 
-    /// How many microfacets mirror a ray that comes in at `cosine`; `cosines` gets those at each.
+    /// The number of microfacets that mirror a ray that comes in at `cosine`; `cosines` gets those at each.
     template <class F>
     int reflections(double cosine, F&& at) {
         Vec3d d{-std::sqrt(1 - cosine * cosine), 0, -cosine};

@@ -58,7 +58,7 @@ TEST_CASE("missing light: what single directions do with lights that have no siz
     CHECK(missing(kPoint, "{type: plastic, reflectance: 0.5, ior: 1.5, roughness: 0.4}").empty());
     // Parts of mixes and sides count.
     CHECK(missing(kPoint, "{type: mix, materials: [other, mirror]}") == metals);
-    // What has a size is found, and what shines nothing is not missed.
+    // A light with a size is found, and one that shines nothing is not missed.
     CHECK(missing(kSun, "{type: dielectric, ior: 1.5}").empty());
     CHECK(
         missing("{type: point, position: [0, 0, 5], radiant_intensity: 0}", "{type: mirror, reflectance: 1}")

@@ -199,7 +199,8 @@ TEST_CASE("materials of families of exporters are what they were", "[mesh_io][mt
     // Maya
     CHECK(typeOf("illum 4\nKd 0.50 0.50 0.50\nKa 0.00 0.00 0.00\nTf 1.00 1.00 1.00\nNi 1.00\n") ==
           MaterialType::Diffuse);
-    // Maya, of a Sponza that 3ds Max wrote: its Ni stays. What lets light pass does so in Maya's files too.
+    // Maya, of a Sponza that 3ds Max wrote: its Ni stays. Materials that let light pass do so in Maya's
+    // files too.
     const std::string maya =
         "illum 4\nKd 0.78 0.78 0.78\nKa 0.00 0.00 0.00\nTf 1.00 1.00 1.00\nNi 1.50\nKs 0.00 0.00 0.00\nNs "
         "50.00\n";

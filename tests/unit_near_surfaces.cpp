@@ -48,8 +48,7 @@ TEST_CASE("a lamp in the plane of another surface that it overlaps is found, and
         CHECK(found(quad(-9, 9, 2, -9, 9), tree));
         CHECK(found(quad(0.5, -0.5, 2, -0.5, 0.5), tree));
         CHECK(found(quad(-0.5, 0.5, 2 - 1e-6, -0.5, 0.5), tree));  // below what rays can tell
-        // What is as far off as is advised, beside the ceiling, at its edge, or stands on the floor is
-        // right.
+        // Surfaces at the advised distance, next to the ceiling, at its edge, or on the floor are right.
         CHECK_FALSE(found(quad(-0.5, 0.5, 2 - 2 * inside->least_gap, -0.5, 0.5), tree));
         CHECK_FALSE(found(quad(3, 4, 2, -0.5, 0.5), tree));
         CHECK_FALSE(found(quad(2, 3, 2, -0.5, 0.5), tree));
@@ -181,7 +180,7 @@ TEST_CASE("surfaces too near and lamps in a plane are found without a BVH as wit
         if (gap == 1e-6) CHECK(expected.near > 0);
     }
 
-    // Neighbours that nobody asks about, beyond the plane through the middle where cells end.
+    // Neighbours that are not checked, beyond the plane through the middle where cells end.
     for (const double gap : {3e-7, 1e-6, 3e-6, 1e-5}) {
         const Scene scene = pairsAboutThePlane(gap);
         const CompiledScene with = compiled(scene),

@@ -1,5 +1,5 @@
-// What --set changes: keys that exclude the one that is set, and keys that null takes away; and what
-// messages suggest to someone who writes a value as another program has it.
+// The effects of --set: keys that exclude the one that is set, and keys that null removes; and suggestions
+// of messages for values in the form of another program.
 #include "scene/yaml/scene_exclusion.h"
 #include "scene_texts.h"
 

@@ -60,7 +60,7 @@ struct Stack {
                 0.2 + 0.1 * i);
         return scene;
     }
-    /// Mean luminance of so many samples of the pixel.
+    /// Mean luminance of this number of samples of the pixel.
     double seen(std::uint64_t samples) const {
         std::vector<f64> sums(2 * ctx.scene->channels);
         u64 count = 0;

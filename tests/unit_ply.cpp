@@ -367,13 +367,13 @@ TEST_CASE("bad PLYs are refused with their place", "[ply]") {
     checkRefused(kHeader + kVertices + "3 0 1 3\n", 13, "uses vertex 3, but the file has 3");
     checkRefused(kHeader + kVertices + "3 0 -1 2\n", 13, "uses vertex -1, but the file has 3");
     CHECK(loadText(kHeader + kVertices + "3.0 0 1.000 2\n").mesh.triangles == Triangles{{0, 1, 2}});
-    // A file of faces without area is sound; who shows it decides what that means.
+    // A file of faces without area is sound; its user decides what that means.
     for (const char* only : {"3 0 1 1\n", "3 0 0 1\n"}) {
         const LoadedMesh nothing = loadText(kHeader + kVertices + only);
         CHECK(nothing.mesh.triangles.empty());
         CHECK(nothing.degenerate_faces == 1);
     }
-    // Meshes that nobody can see
+    // Invisible meshes
     checkRefused(kHeader + kVertices + "2 0 1\n", 13,
                  "a face needs at least three corners, and face 0 has 2");
     checkRefused(kHeader + "nan 0 0\n1 0 0\n0 1 0\n" + face, 10,
@@ -406,7 +406,7 @@ TEST_CASE("a binary PLY that ends early, anywhere, is refused", "[ply]") {
             CHECK_THROWS_WITH(loadPly(folder.write("a.ply", ply.content.substr(0, size))),
                               Contains("bytes follow") || Contains("cut off"));
         }
-        // A length that the rest of the file cannot hold, in a list that nobody reads.
+        // A length that the rest of the file cannot hold, in an unused list.
         std::string wild = ply.content;
         wild[header + 12] = '\xff';
         const TemporaryFolder folder;
@@ -452,7 +452,7 @@ TEST_CASE("a PLY says the same in blocks of any size and with any number of thre
     };
     const std::string whole = digest(good, 1000), refusal = digest(bad, 1000);
     CHECK_THAT(whole, Contains("shaded flat"));
-    CHECK_THAT(refusal, Contains("face 17 of 30, counted from 0, names vertex 57"));
+    CHECK_THAT(refusal, Contains("face 17 of 30, counted from 0, uses vertex 57"));
     for (const unsigned threads : {1u, 3u, 16u})
         runWithThreads(threads, [&] {
             for (std::size_t rows = 1; rows < 45; ++rows) {

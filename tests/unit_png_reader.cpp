@@ -43,7 +43,7 @@ CrtTexelsInfo infoOf(const PngKind& kind) {
     return info;
 }
 
-/// Whether the reader takes the file, and what it makes of it.
+/// True if the reader takes the file, and its result.
 bool reads(const std::string& path, const PngKind& kind, std::vector<unsigned char>& texels) {
     const CrtTexelsInfo info = infoOf(kind);
     texels.assign(std::size_t{info.width} * info.height * info.channels * kind.bits / 8, 99);
@@ -145,7 +145,7 @@ TEST_CASE("a PNG whose checksums hold and whose pixels do not is refused in the 
     spit(path, pngOf(kind, flipped));
     CHECK_FALSE(reads(path, kind));
 
-    // What libpng forgives, it reads: pixels apart, and more of them than there are.
+    // The reader accepts what libpng forgives: pixels apart, and more of them than there are.
     const std::string more = pngOf(kind, zlibStream(rows + rows));
     for (const std::string& png :
          {more, pngHeader(kind) + pngChunk("IDAT", stream) + pngChunk("tEXt", "a") + pngChunk("IDAT", "") +

@@ -16,13 +16,13 @@ using namespace crt::stats;
 
 namespace {
 
-/// Mean 0 and true variance 1, and an estimate of it with so many degrees of freedom.
+/// Mean 0 and true variance 1, and an estimate of it with this number of degrees of freedom.
 Mean estimated(std::mt19937_64& random, double variance, double dof) {
     return {std::sqrt(variance) * std::normal_distribution<double>()(random),
             variance * std::chi_squared_distribution<double>(dof)(random) / dof, dof};
 }
 
-/// Whether so many of `trials` are too many for a test of this level, but one time in 10,000.
+/// True if this number of `trials` is too many for a test of this level, but one time in 10,000.
 bool exceeds(int alarms, int trials, double level) {
     return clopperPearson(static_cast<std::uint64_t>(alarms), static_cast<std::uint64_t>(trials), 0.9998)
                .lower > level;
@@ -204,7 +204,7 @@ TEST_CASE("a pooled variance is that of equal pixels, never 0 amid noise, and ke
     CHECK(of_one.variances[10 * 20 + 13] == Approx(correction(49)).epsilon(1e-4));
     CHECK(of_one.variances[10 * 20 + 14] == 0);
     CHECK(of_one.degrees_of_freedom[10 * 20 + 13] == Approx(3));
-    // What is not known adds nothing, and stays so.
+    // Unknown values add nothing, and stay so.
     std::vector<double> lost = equal;
     lost[10 * 20 + 10] = std::numeric_limits<double>::infinity();
     const PooledVariances of_lost = pooledVariances(lost, 20, 20, 1);

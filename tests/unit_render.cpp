@@ -68,7 +68,7 @@ struct Heard : Watch {
     }
 };
 
-/// Renders with a listener of its own.
+/// Renders with a separate listener.
 Film renderHeard(const std::string& yaml, const std::string& name, Heard& heard) {
     const Listener listener(
         [&heard](LogLevel, std::string_view message) { heard.messages.emplace_back(message); },

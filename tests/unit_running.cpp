@@ -1,5 +1,5 @@
-// What stands between the command line and the film: words to values, which samples are missing, the texts
-// of progress, and a device that fails in the middle.
+// The code between the command line and the film: words to values, missing samples, the texts of progress,
+// and a device that fails in the middle.
 #include "backend/loader.h"
 #include "base/unit_text.h"
 #include "catch.h"

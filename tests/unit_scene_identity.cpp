@@ -1,4 +1,4 @@
-// Which scenes are the same to a film: their hash.
+// Scenes that are the same to a film: their hash.
 #include "compiled_scenes.h"
 
 #include "base/error.h"
@@ -266,7 +266,7 @@ TEST_CASE("the hash is the scene's: the same for the same, another for another",
         s.meshes[0].normal_index = {{0, 0, 0}, {0, 0, 0}};
     });
     CHECK(compiled(litFloor(), crt::kAovDepth).hash != a.hash);
-    // What the film does with the samples afterwards is not the scene's.
+    // Later use of the samples by the film is not the scene's.
     CHECK(changed([](Scene& s) {
               s.film.exposure_ev = 2;
               s.title = "another";

@@ -188,7 +188,7 @@ TEST_CASE("parts of an OBJ have materials and emission by group, object or mater
     CHECK(partsOf("shade: {material: a}") == "c lamp.obj:brass a lamp.obj:glow*2 lamp.obj:glow*2 ");
     CHECK(partsOf("brass: {material: a}") == "c a a lamp.obj:glow*2 lamp.obj:glow*2 ");
     CHECK(partsOf("default: {material: a}") == "c lamp.obj:brass lamp.obj:brass a lamp.obj:glow*2 ");
-    // What emits by the file's material stops with it, unless the part emits.
+    // Emission of the file's material stops with it, unless the part emits.
     CHECK(partsOf("bulb: {material: a}") == "c lamp.obj:brass lamp.obj:brass a a ");
     CHECK(partsOf("bulb: {" + light + "}") ==
           "c lamp.obj:brass lamp.obj:brass lamp.obj:glow*7 lamp.obj:glow*7 ");

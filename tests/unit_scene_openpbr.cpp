@@ -114,7 +114,7 @@ TEST_CASE("openpbr's coat lies on each of its parts, which are others below it",
     CHECK(materials("coat_weight: 1, specular_ior: 2, coat_ior: 1.25")[0].eta[0] == Approx(1.6));
     CHECK(materials("coat_weight: 1, coat_ior: 1.5")[0].type == MaterialType::Diffuse);
     CHECK(plain[0].roughness == 0.3);
-    // How rough it is below: diffuse, but for what the gloss reflects straight on.
+    // Roughness below: diffuse, but for what the gloss reflects straight on.
     const double reflected = std::pow(0.1 / 3.1, 2);
     CHECK(plain[0].clearcoat->base_roughness == Approx(1 - 0.7 * reflected));
     CHECK(materials("coat_weight: 1, coat_ior: 1.5")[0].clearcoat->base_roughness == 1);

@@ -59,7 +59,7 @@ TEST_CASE("texts that are not YAML, or not the YAML of a scene", "[scene_yaml][r
         laughs += "]\n";
     }
     CHECK_THAT(refused(laughs),
-               Contains("values behind aliases, which take") && Contains("set CRT_SCENE_MEMORY="));
+               Contains("values behind aliases, which need") && Contains("set CRT_SCENE_MEMORY="));
 }
 
 TEST_CASE("the version comes first", "[scene_yaml][refused]") {
@@ -406,7 +406,7 @@ TEST_CASE("objects that cannot be", "[scene_yaml][refused]") {
                Contains("did you mean 'translate'?"));
     CHECK_THAT(refused(meshScene("mesh: " + kTriangle +
                                  ", transform: [{matrix: [1,0,0,0, 1,0,0,0, 0,0,1,0, 0,0,0,1]}]")),
-               Contains("cannot be inverted"));
+               Contains("is not invertible"));
     CHECK_THAT(refused(meshScene("mesh: " + kTriangle +
                                  ", transform: [{matrix: [1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,2]}]")),
                Contains("the last row must be 0 0 0 1"));

@@ -1,4 +1,4 @@
-// What scenes share: files that they include, and named data.
+// Shared parts of scenes: files that they include, and named data.
 #include "captured_log.h"
 #include "catch.h"
 #include "base/temporary_folder.h"
@@ -91,7 +91,7 @@ outputs: [{file: a.exr}]
     // Both are read, so that no output replaces either.
     REQUIRE(scene.files_read.size() == 2);
     CHECK_THAT(scene.files_read[1], Contains("shared/room.yaml"));
-    // What the scene itself leaves unused is a warning; a shared file is there to be chosen from.
+    // Unused definitions of the scene itself are a warning; a shared file is there to be chosen from.
     CHECK_THAT(log.text(), Contains("'extra' is not used"));
     CHECK_THAT(log.text(), !Contains("'other'"));
     CHECK_THAT(log.text(), !Contains("'spare'"));
@@ -189,7 +189,7 @@ TEST_CASE("named data are the tables that they say they are", "[sharing]") {
             parseScene("crt: 1\nenvironment: {radiance: " + form + "}\n", "scene.yaml", ".");
         return scene.environment->radiance;
     };
-    // What has a form of its own is the same spectrum under its name.
+    // A spectrum with a separate form is the same under its name.
     CHECK(radiance("{data: illuminants/F11}") == radiance("{illuminant: F11}"));
     CHECK(radiance("{data: glasses/SF10, scale: 2}") == radiance("{glass: SF10, scale: 2}"));
     CHECK(radiance("{data: metals/Au/n}") == metalIndex("Au")->first);

@@ -156,8 +156,8 @@ TEST_CASE("every AOV is written by its name in a scene, alone and together", "[s
         together |= row.aov;
         list += fmt::format("{}{}", list.empty() ? "" : ", ", row.name);
 
-        // Read from the scene, resolved from a film that has what the scene asks for: the channels that the
-        // row names, and no others.
+        // Read from the scene, resolved from a film that has what the scene needs: the channels that the row
+        // names, and no others.
         const std::uint32_t in_film = output.aovs & kAovsOfFirstHits;
         const Image image =
             resolveImage(Film({2, 1, channelsFor(in_film), in_film}), Development{}, output.aovs);
@@ -165,7 +165,7 @@ TEST_CASE("every AOV is written by its name in a scene, alone and together", "[s
         const std::vector<std::string> own = exrNames(row);
         CHECK_FALSE(own.empty());
         if (!row.integer) channels.insert(channels.end(), own.begin(), own.end());
-        // What is said of noise comes with what makes it usable in other ways.
+        // Output of noise comes with the planes that make it usable in other ways.
         if (row.aov == kAovError) channels.emplace_back("HalfWidth95.Y");
         if (row.aov == kAovError || row.aov == kAovVariance) channels.emplace_back("OwnVariance.Y");
         CHECK(image.channels == channels);

@@ -63,7 +63,7 @@ void add(Scene& scene, const Quadric& shape, const Matrix4d& transform = crt::kI
     object.transforms = {transform};
     scene.objects.push_back(object);
 }
-/// What makes the floats of a scene coarse around the origin.
+/// A surface that makes the floats of a scene coarse around the origin.
 void addFarTriangle(Scene& scene, double far) {
     crt::Mesh mesh;
     crt::verify::addTriangle(mesh, {far, 0.3 * far, -0.6 * far}, {far + 1, 0.3 * far, -0.6 * far},
@@ -94,7 +94,7 @@ Walk walkIn(const CompiledScene& compiled, u32 shapes, std::uint64_t steps, Rand
     CrtHit hit = crt_no_hit(CRT_INFINITY);
     vec3 side = make_vec3(0, 0, 0);
     while (walk.steps < steps) {
-        if (hit.slot == CRT_NONE) {  // anew, from somewhere inside
+        if (hit.slot == CRT_NONE) {  // again, from somewhere inside
             const CrtShape& shape = arrayOf<CrtShape>(compiled, scene.shapes)[0];
             const vec3 centre = crt_load3(shape.centre);
             hit = crt_brute_force_closest(&ctx, rayOf(centre, toFloat(random.direction())));

@@ -77,7 +77,7 @@ TEST_CASE("bins and responses that cannot be are refused where they stand", "[sp
     };
     refused("spectral: {from_nm: 700, to_nm: 400, bins: 3}", "exchange 'from_nm' and 'to_nm'");
     refused("spectral: {from_nm: 400, to_nm: 400, bins: 3}", "no wavelengths between");
-    refused("spectral: {from_nm: 400, to_nm: 401, bins: 11}", "ask for 10 at most");
+    refused("spectral: {from_nm: 400, to_nm: 401, bins: 11}", "use at most 10");
     refused("spectral: {from_nm: 300, to_nm: 700, bins: 3}", "'from_nm' is 300; it must be 360 to 830");
     refused("spectral: {from_nm: 400, to_nm: 900, bins: 3}", "'to_nm' is 900; it must be 360 to 830");
     refused("spectral: {from_nm: 400, to_nm: 700, bins: 0}", "1 to 1024");
@@ -106,7 +106,7 @@ TEST_CASE("a film keeps its bins and responses in its file", "[spectral]") {
     CHECK(back.shape() == film.shape());
     CHECK(back.sums == film.sums);
     CHECK(back_identity.record->spectral == identity.record->spectral);
-    // What its channels are only the record says.
+    // Only the record gives the meaning of its channels.
     FilmIdentity without = identity;
     without.record.reset();
     CHECK_THROWS_AS(writeCheckpoint(path, film, without), Error);
@@ -147,7 +147,7 @@ TEST_CASE("films that differ in bins or responses do not merge, and say in what"
     CHECK_THAT(refusal("spectral: {from_nm: 400, to_nm: 700, bins: 5}"), Contains("the spectral film is 5"));
     std::string other = kInstruments;
     other.replace(other.find("flat: 2"), 7, "flat: {table: {nm: [360, 830], value: [1, 2]}}");
-    CHECK_THAT(refusal(other), Contains("the spectral film is another"));
+    CHECK_THAT(refusal(other), Contains("the spectral film differs"));
 }
 
 TEST_CASE("an EXR has bins and responses beside the image, whatever it is developed to", "[spectral]") {

@@ -73,7 +73,7 @@ Scene sceneOf(const std::string& yaml, const std::string& folder = {}) {
     return crt::parseScene(yaml, "test.yaml", folder);
 }
 
-/// What the kernel makes of the reflectance of the first material at (u, v), as linear sRGB under D65.
+/// The kernel's value of the reflectance of the first material at (u, v), as linear sRGB under D65.
 class Probe {
 public:
     explicit Probe(const std::string& yaml, const std::string& folder = {})

@@ -1,4 +1,4 @@
-// What the host makes does not depend on the number of its threads, nor on how a file is cut into blocks.
+// The results of the host do not depend on the number of its threads, nor on how a file is cut into blocks.
 #include "base/error.h"
 #include "base/listener.h"
 #include "base/log.h"

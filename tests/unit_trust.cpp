@@ -115,7 +115,7 @@ TEST_CASE("a link that others could have made leads to no code", "[trust]") {
     CHECK(trust::judge(sticky / "name").why.empty());
     CHECK(trust::judge(sticky / "name").path == file);
     CHECK(trust::judge((closed / "../closed/./name").string()).path == file);
-    // Who can write to the folder of a link decides where it leads, be it the last part of a name or not.
+    // A user who can write to the folder of a link decides its target, be it the last part of a name or not.
     fs::create_symlink(closed, open / "folder");
     fs::create_symlink(open / "folder/code", closed / "round about");
     for (const fs::path& name : {open / "folder/code", closed / "round about"}) {

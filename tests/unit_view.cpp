@@ -1,12 +1,11 @@
-// The view: a camera in somebody's hands, a compiled scene seen otherwise, the names of surfaces, and who is
-// answered.
+// The view: a moved camera, a compiled scene seen with it, the names of surfaces, and access control.
 #include "compiled_scenes.h"
 #include "scene_texts.h"
 
 #include "base/error.h"
 #include "base/temporary_folder.h"
 #include "compile/change_view.h"
-#include "view/board.h"
+#include "view/view_state.h"
 #include "view/camera_moves.h"
 #include "view/file_times.h"
 #include "view/http_server.h"
@@ -244,7 +243,7 @@ TEST_CASE("slow devices begin with small pictures, fast ones with the whole", "[
     CHECK(pace.firstDivisor(pixels) == 1);
     CHECK(pace.samplesOfChunk(pixels, false) == 30);
     CHECK(pace.samplesOfChunk(pixels, true) == 400);
-    // What it takes to show a picture is not spent on samples as well.
+    // The time to show a picture is not spent on samples as well.
     pace.handedOn(0.005);
     CHECK(pace.samplesOfChunk(pixels, false) == 30);
     for (int i = 0; i < 30; ++i) pace.handedOn(0.0245);
@@ -393,17 +392,17 @@ TEST_CASE("packets for tev have its layout", "[view]") {
         CHECK_THROWS_AS(crt::parseTevAddress(text), crt::Error);
 }
 
-TEST_CASE("who waits at the board is woken by news and by its end", "[view]") {
-    crt::Board board;
-    CHECK_FALSE(board.isWatched());
-    const std::uint64_t version = board.now().version;
-    CHECK(board.isWatched());
-    std::thread writer([&] { board.update([](crt::Status& status) { status.title = "news"; }); });
-    const auto sight = board.waitBeyond(version, std::chrono::seconds(60));
+TEST_CASE("who waits at the state is woken by news and by its end", "[view]") {
+    crt::ViewState state;
+    CHECK_FALSE(state.isWatched());
+    const std::uint64_t version = state.now().version;
+    CHECK(state.isWatched());
+    std::thread writer([&] { state.update([](crt::Status& status) { status.title = "news"; }); });
+    const auto copy = state.waitBeyond(version, std::chrono::seconds(60));
     writer.join();
-    CHECK(sight.status.title == "news");
-    CHECK(sight.version != version);
-    std::thread closer([&] { board.close(); });
-    CHECK(board.waitBeyond(sight.version, std::chrono::seconds(60)).closed);
+    CHECK(copy.status.title == "news");
+    CHECK(copy.version != version);
+    std::thread closer([&] { state.close(); });
+    CHECK(state.waitBeyond(copy.version, std::chrono::seconds(60)).closed);
     closer.join();
 }

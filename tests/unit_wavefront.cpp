@@ -1,4 +1,4 @@
-// Which scenes a GPU renders in waves, and which kernels those need.
+// Scenes that a GPU renders in waves, and the kernels that they need.
 #include "backend/sdk/gpu_schedule.h"
 #include "common/wave_plan.h"
 #include "compiled_scenes.h"

@@ -9,7 +9,7 @@ from .results import Results
 
 SCENES = ["cornell_box", "cornell_sphere", "cornell_figure", "cornell_dragon"]
 KINDS = {"none": "loop", "aabb": "object boxes", "bvh": "BVH"}
-# The triangles are what a path of a loop costs: so many tests are enough for a timing.
+# The triangles are what a path of a loop costs: this number of tests is enough for a timing.
 TESTS = 1e9
 COUNTS = [12, 16, 24, 32, 48, 64, 96, 128, 192, 256, 384, 512]
 

@@ -16,7 +16,8 @@ CONFIDENCE = 0.95
 
 
 def beyond(confidence, of, dof):
-    """The point that the largest of so many numbers of Student's distribution passes with 1 - confidence
+    """The point that the largest of this number of values of Student's distribution passes with 1 -
+    confidence
     (Šidák); one-sided."""
     t = np.linspace(0.0, 100.0, 200_001)
     density = (1 + t**2 / dof) ** (-(dof + 1) / 2)
@@ -25,7 +26,7 @@ def beyond(confidence, of, dof):
 
 
 def write_picture(path):
-    """What textured scenes show: colours that change across and down, and a corner that is unlike the
+    """The values of textured scenes: colours that change across and down, and a corner that is unlike the
     others."""
     v, u = np.mgrid[0:12, 0:16] / 16
     rgb = np.stack([0.15 + 0.7 * u, 0.2 + 0.6 * v, 0.75 - 0.5 * u * v], axis=2)
@@ -34,7 +35,7 @@ def write_picture(path):
 
 
 def write_normals(path):
-    """What scenes with normal maps show: waves across, and a slope up the picture that grows."""
+    """The values of scenes with normal maps: waves across, and a slope up the picture that grows."""
     v, u = np.mgrid[0:24, 0:32] / 32
     normals = np.stack([0.2 * np.sin(4 * np.pi * u), 0.25 * (0.75 - v) - 0.1, np.ones_like(u)], axis=2)
     normals /= np.linalg.norm(normals, axis=2, keepdims=True)
@@ -42,7 +43,7 @@ def write_normals(path):
 
 
 def write_sky(path):
-    """What environment images show: a bright spot over a horizon, and colours that change all around. So
+    """The values of environment images: a bright spot over a horizon, and colours that change all around. So
     smooth that it is the same between texels and within."""
     v, u = (np.mgrid[0:256, 0:512] + 0.5) / 512
     rgb = np.stack([0.5 + 0.4 * np.cos(2 * np.pi * u), 0.4 + 0.3 * np.sin(2 * np.pi * u), 0.9 - v], axis=2)
@@ -88,7 +89,7 @@ class Agreement:
         whole = float(ours.of(mean)[0])
         self.tiles = (b / self.ratio - a) / whole           # in units of the image's mean
         self.tiles_se = np.sqrt(va + vb / self.ratio**2) / whole
-        # At least so many, however unlike the two variances are (Welch).
+        # At least this number, however unlike the two variances are (Welch).
         self.dof = len(ours.images) - 1
 
     def reach(self):
@@ -105,14 +106,14 @@ class Agreement:
         return float(((np.abs(self.tiles) - MARGIN) / np.maximum(self.tiles_se, 1e-12)).max())
 
     def chance(self):
-        """What the largest of all tiles stays below by chance."""
+        """The bound of the largest of all tiles by chance."""
         return beyond(CONFIDENCE, TILES * TILES, self.dof)
 
     def tiles_agree(self):
         return self.worst_excess() < self.chance()
 
     def resolves(self):
-        """Whether a difference of two margins in the median tile would have been seen."""
+        """True if a difference of two margins in the median tile would have been seen."""
         return float(np.median(self.tiles_se)) * self.chance() < MARGIN
 
 

@@ -1,7 +1,7 @@
 """Do crt and Mitsuba 3 converge to one image? Scenes of bench/scenes/agree, a kind of material, texture or
-light each, are translated by a program (agree_scene.py) and rendered by both, several times with seeds of
-their own. The verdict is an equivalence test: the mean luminance of the two differs by less than 0.5 %, with
-95 % confidence, and in no tile of 8 × 8 do they differ, after the common factor, by more than 0.5 % of the
+light each, are translated by a program (agree_scene.py) and rendered by both, several times with different
+seeds. The verdict is an equivalence test: the mean luminance of the two differs by less than 0.5 %, with 95
+% confidence, and in no tile of 8 × 8 do they differ, after the common factor, by more than 0.5 % of the
 image's mean beyond what chance gives in one of 64 tiles (Šidák). Where the models differ on purpose, the
 scene says how, and that is what is reported. Times nothing: it may run on a busy machine.
 

@@ -134,7 +134,7 @@ def light(given):
 
 @dataclasses.dataclass
 class Band:
-    """What a spectral film measures: the name of crt's channel, and a sensor's answer in Mitsuba."""
+    """The measurement of a spectral film: the name of crt's channel, and a sensor's response in Mitsuba."""
 
     channel: str
     nm: list
@@ -171,7 +171,7 @@ def fov_deg(camera):
     return 2 * math.degrees(math.atan(camera["sensor"][0] / (2 * camera["focal_length"])))
 
 
-# What a renderer of radiance has no use for: files, how an image is shown, and how crt finds its hits.
+# Keys without a meaning for a renderer of radiance: files, display settings, and the search for hits.
 SHOWN = {"filter", "color_space", "white_balance", "exposure_ev"}
 
 
@@ -251,7 +251,7 @@ def translate(file, folder, samples, band=None, meshes=None):
 
 
 def difference(file):
-    """What the scene says of how the models differ: the text of its comment "# differs: …", or None."""
+    """The scene's note on differences of the models: the text of its comment "# differs: …", or None."""
     text = re.search(r"^# differs: (.*(?:\n#   .*)*)$", file.read_text(), re.MULTILINE)
     return " ".join(text[1].replace("\n#", " ").split()) if text else None
 

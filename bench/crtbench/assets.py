@@ -30,7 +30,8 @@ SHOWN = 12  # Sentences of a section in docs/results.
 
 
 class Model:
-    """What crt did with one file: exit code, error, warnings, and whether its picture shows something."""
+    """The result of crt for one file: exit code, error, warnings, and True if its picture shows
+    something."""
 
     def __init__(self, program, backend, folder, path):
         self.name = str(path.relative_to(folder))
@@ -242,7 +243,7 @@ def counts(models):
 
 
 def parts(warning):
-    """What one warning lists, each by itself, without the name of the file."""
+    """The entries of one warning, without the name of the file."""
     listed = warning.split(": ignored or approximated: ")
     return listed[1].split("; ") if len(listed) == 2 else [warning]
 

@@ -32,7 +32,7 @@ SCENES = {
 HEAVY = ("caustic", "glossy under a point", "measured lamps", "soap")
 PRICED = ("box", "room", "prism", "hidden lamp", "caustic")
 SEEDS, PRICE_SEEDS = 40, 16
-# What is asked: mode, side of the image in pixels, sampler.
+# The configuration: mode, side of the image in pixels, sampler.
 ASKED = [("stated", 48, "sobol"), ("stated", 48, "independent"), ("price", 48, "sobol")]
 
 

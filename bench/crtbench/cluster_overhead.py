@@ -42,7 +42,7 @@ def processor_seconds(client):
 
 
 def start(workers, gpus):
-    """A cluster of so many processes; each sees one GPU where `gpus` is."""
+    """A cluster of this number of processes; each sees one GPU where `gpus` is."""
     if not gpus:
         return distributed.LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=None)
     specification = {index: {"cls": distributed.Nanny,

@@ -1,7 +1,7 @@
 """A thousand workers of Dask whose parts only sleep: what do scheduler, client and merges cost a long
 render? Prints a table; nothing is written.
 
-Real: crt.distributed with all it does in this process, the scheduler in one of its own, each worker with its
+Real: crt.distributed with all it does in this process, the scheduler in a separate one, each worker with its
 own connections, all messages, and what the client does with a film: it reads a packed one and adds it. The
 workers share some processes (--processes), as one machine has not a thousand nodes. Made up: a part sleeps
 for as long as a worker of its speed would render (speeds differ by --spread), and gives its range of samples
@@ -57,12 +57,12 @@ class Films:
                          [film_bytes(film) for film in self.films] if real_sums else [])
 
     def take(self):
-        """What the client does with a film that comes to it."""
+        """The client's work on a film that arrives."""
         return film_of(self.packed) + self.films[1]
 
 
 class Sums:
-    """What workers do with films: packed ones that are added; none where it only takes so long."""
+    """The work on films: packed ones that are added; none where it only takes so long."""
 
     def __init__(self, add_seconds, send_seconds, packed):
         self.add_seconds, self.send_seconds, self.packed = add_seconds, send_seconds, packed
@@ -139,7 +139,7 @@ async def added(parts):
 def set_up():
     """Of each process."""
     dask.config.set(QUIET)
-    # What goes wrong ends the render here; when all is done, each worker would tell that the others go.
+    # An error ends the render here; when all is done, each worker would report that the others go.
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     most = resource.getrlimit(resource.RLIMIT_NOFILE)[1]
     resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
@@ -177,7 +177,7 @@ def serve_workers(scheduler, names, sums, speeds):
 
 @contextlib.contextmanager
 def cluster(processes, speeds):
-    """A client of a scheduler with one worker for each of these speeds, in so many processes."""
+    """A client of a scheduler with one worker for each of these speeds, in this number of processes."""
     context = multiprocessing.get_context("spawn")
     addresses = context.Queue()
     started = [context.Process(target=serve_scheduler, args=(addresses,))]

@@ -1,5 +1,5 @@
-"""How often statements of `crt converge` are wrong where the truth is known by construction. The rows are
-not rendered: they are progressive means of normal samples, pixel by pixel, of known variance, bias and cost,
+"""Counts wrong statements of `crt converge` where the truth is known by construction. The rows are not
+rendered: they are progressive means of normal samples, pixel by pixel, of known variance, bias and cost,
 against a reference that is exact or has eight noisy folds; they go through the same analysis and the same
 sentences as rows of renders. Nothing is timed: it may run on a busy machine."""
 
@@ -74,7 +74,7 @@ def by_statement(rows):
 
 
 def excess(row):
-    """Whether it was wrong more often than chance would have it."""
+    """True if it was wrong more often than chance would have it."""
     p = row["stated"]
     return row["wrong"] > row["asked"] * p + 3 * math.sqrt(row["asked"] * p * (1 - p))
 

@@ -20,7 +20,7 @@ def few_runs(spp, _seconds):
 
 def timings(program, backends, resolutions, longest, settings=(), runs=few_runs, keep=print):
     """A row for every render: of growing numbers of samples, as long as one is likely to take less than
-    `longest` seconds. `runs(spp, seconds of the last)`: how often each is rendered; `keep(row)` is told of
+`longest` seconds. `runs(spp, seconds of the last)`: how often each is rendered; `keep(row)` gets
     each row when it is there."""
     rows = []
     for resolution in resolutions:

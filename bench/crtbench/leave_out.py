@@ -1,5 +1,6 @@
-"""What leaving out saves: the kernel that has just what the scene needs against the one that has everything,
-and against the same kernel with one feature more, for every feature. The one feature more comes through
+"""Measures the gain of leaving features out: the kernel that has just what the scene needs against the one
+that has everything, and against the same kernel with one feature more, for every feature. The one feature
+more comes through
 CRT_KERNEL_DIR: a copy of the kernel texts in which every kernel has it."""
 
 import concurrent.futures
@@ -40,7 +41,7 @@ def compile_ahead(program, kernels, settings):
 
 
 def gain(more, lean):
-    """What `more` costs over `lean`, run by run."""
+    """Cost of `more` over `lean`, run by run."""
     return Spread(m / l for m, l in zip(more, lean))
 
 
@@ -85,7 +86,7 @@ def measure(program, arguments):
         )
 
     def same_image(scene, environment):
-        """Whether the kernel with the feature more does the same work: it renders the same bits."""
+        """True if the kernel with the feature more does the same work: it renders the same bits."""
         images = [program.scratch / f"{scene}-{which}.exr" for which in ("without", "with")]
         if not images[0].exists():
             render(scene, timed, "lean-only", [images[0]])
@@ -267,7 +268,7 @@ def measure(program, arguments):
 
 
 def in_waves(program, scene):
-    """Whether CUDA renders the scene by kernels of their own for tracing and for each kind of material."""
+    """True if CUDA renders the scene by separate kernels for tracing and for each kind of material."""
     return "paths sorted by material" in program.start(["info", program.scene_file(scene)]).output
 
 

@@ -1,5 +1,4 @@
-"""What is fitted and drawn on two logarithmic scales: power laws through points, and charts by matplotlib,
-as SVG with text as text and with colours for light and for dark."""
+"""Fits and drawings on two logarithmic scales: power laws"""
 
 import io
 import math
@@ -8,8 +7,8 @@ import sys
 
 from .program import Failure
 
-# Colours are pairs: on light and on dark. What is drawn has the first; svg() exchanges them by their value,
-# so that no two pairs may have the first in common.
+# Colours are pairs: on light and on dark. Drawings have the first; svg() exchanges them by their value, so
+# that no two pairs may have the first in common.
 INK, SOFT = ("#1a1a1a", "#eeeeee"), ("#555555", "#b0b0b0")
 GRID, FRAME, PAPER = ("#e2e2e2", "#343434"), ("#999999", "#777777"), ("#ffffff", "#161616")
 # The salt makes the names of a chart's parts the same whenever it is drawn.
@@ -42,7 +41,7 @@ class PowerLaw:
 
 
 def library():
-    """matplotlib, which nothing but a chart needs. Who measures for long asks for it before."""
+    """matplotlib, which nothing but a chart needs. A longer measurement asks for it before."""
     try:
         import matplotlib.figure
         import matplotlib.ticker
@@ -94,7 +93,7 @@ def decimal_ticks(axis, text):
 
 
 def touching(boxes):
-    """Whether neighbours overlap, or have no room of 3 units between them."""
+    """True if neighbours overlap, or have no room of 3 units between them."""
     return any(a.padded(3).overlaps(b) for a, b in zip(boxes, boxes[1:]))
 
 

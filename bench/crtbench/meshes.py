@@ -83,7 +83,8 @@ def face_count(text):
 
 
 class File:
-    """What crt did with one OBJ: its exit code, its error, its warnings, and the share of pixels in which
+    """The result of crt for one OBJ: its exit code, its error, its warnings, and the share of pixels in
+    which
     the mesh is seen."""
 
     def __init__(self, program, backend, folder, path):

@@ -101,7 +101,7 @@ def files_of(program, only):
 
 
 def write_inputs(folder):
-    """What the scenes name and no repository holds."""
+    """The files of the scenes that no repository holds."""
     write_picture(folder / "picture.png")
     write_normals(folder / "normals.png")
     write_sky(folder / "sky.exr")

@@ -16,7 +16,7 @@ import tempfile
 
 
 def name_of(line):
-    """What follows the first word: names may hold spaces."""
+    """The text after the first word: names may hold spaces."""
     return line.split(None, 1)[1].strip()
 
 
@@ -44,7 +44,8 @@ def materials(path):
 
 
 def not_diffuse(said):
-    """Why a material is not opaque and diffuse, or nothing. A white Tf filters no light and is written for
+    """The reason why a material is not opaque and diffuse, or nothing. A white Tf filters no light and is
+    written for
     opaque surfaces (3ds Max, Maya); `illum 4` is what Maya writes for all surfaces."""
 
     def first(keyword, unstated):

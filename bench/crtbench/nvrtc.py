@@ -1,4 +1,4 @@
-"""What tests/nvrtc_variants prints, as data."""
+"""Reads the output of tests/nvrtc_variants."""
 import re
 
 from .program import Failure

@@ -342,7 +342,7 @@ def wrong_rows(found):
 
 
 def begin(results, found):
-    """What the page is of, on what it was measured, and what is wrong with it."""
+    """The subject of the page, the machine, and any errors."""
     results.paragraph(
         "crt grew out of a course paper: a path tracer on a GPU, with tables and figures of its parts. Here "
         f"are its experiments, made again with today's crt. Where a figure of the paper is {UNKNOWN} to the "
@@ -389,7 +389,7 @@ def begin(results, found):
 
 
 def is_elsewhere(found, absent):
-    """Whether what one machine could not measure is in the rows of another."""
+    """True if another machine's rows have the results that one machine could not measure."""
     part, what = absent["of"], absent["what"]
     if what in ("paper_host", "paper_gpu"):
         return bool(found.all("run", of=part, what=what, complete=True))
@@ -400,7 +400,7 @@ def is_elsewhere(found, absent):
 
 
 def end(results, found, arguments):
-    """What is not there, and how to measure it."""
+    """Missing results, and how to measure them."""
     asked = {part for m in found.all("machine") for part in m["parts"]}
     absent = {}
     for row in found.all("absent"):

@@ -2,8 +2,8 @@
 copy of the kernel that the OpenCL backend compiles while it runs (CRT_KERNEL_DIR); the Embree backend was
 compiled before and stays sound. `crt compare --backends opencl,embree` then judges by other seeds alone, and
 `crt verify` by answers known in closed form. Without a fault the same commands must pass, or finding it
-means nothing. Seconds are of the whole process, kernels compiled anew. A found fault is a verdict FAIL, exit
-code 7."""
+means nothing. Seconds are of the whole process, kernels compiled again. A found fault is a verdict FAIL,
+exit code 7."""
 
 import json
 import shutil

@@ -230,7 +230,7 @@ class Program:
         """A copy of the kernel texts with a patch of the repository in it, for CRT_KERNEL_DIR."""
         tree = self.scratch / patch.stem
         shutil.copytree(self.repository / "core" / "kernel", tree / "core" / "kernel")
-        # Without fuzz: where the text around a change is another now, somebody has to look.
+        # Without fuzz: if the text around a change differs now, the patch needs an update by hand.
         done = subprocess.run(
             ["patch", "--strip=1", "--fuzz=0", "--silent", "-d", str(tree), "-i", str(patch)],
             capture_output=True,
@@ -265,7 +265,7 @@ class Program:
         shutil.copytree(self.repository / "core" / "kernel", directory)
         asked = " || ".join(f"((CRT_FEATURES) & ~{mask:#x}ul) == 0" for mask in masks)
         # CRT_KERNEL_DIR wants the headers of the layout untouched, features.h among them: the first that
-        # includes them is told more.
+        # includes them gets more.
         more = (
             f"#undef CRT_HAS\n#if {asked}\n"
             f"#define CRT_MORE ((CRT_FEATURES) | {extra:#x}ul)\n"
@@ -308,7 +308,8 @@ class Spread:
 
 
 def significant(value, digits=3):
-    """A number with so many significant digits, without exponent in the range of what is measured here."""
+    """A number with this number of significant digits, without exponent in the range of the measurements
+    here."""
     if value == 0:
         return "0"
     text = f"{value:.{digits}g}"

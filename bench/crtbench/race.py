@@ -57,7 +57,8 @@ class Point:
 
 
 class Crt:
-    """One backend of crt, a process for every image, with Sobol points in so many replicates (crt's default
+    """One backend of crt, a process for every image, with Sobol points in this number of replicates (crt's
+    default
     is two: an image of one does not know its error)."""
 
     def __init__(self, program, file, backend, replicates, size):
@@ -221,7 +222,7 @@ def row(scene, name, points, seconds):
 
 
 def sentence(file, found, ratio, references):
-    """What came out of a scene, in words."""
+    """The result for a scene, in words."""
     ours, theirs = best(found, "crt"), best(found, "Mitsuba")
     said = f"**{ours / theirs:.2f}**" if ours and theirs else "not known: the target was not reached"
     samples, our_error = error_at(found, "crt")

@@ -5,7 +5,7 @@ of rendering alone: scenes are loaded and kernels compiled before.
 
 The error is the root of the mean over pixels and renders of the squared difference in luminance from the
 program's own converged image, over the mean luminance; the variance of that image is taken off. Each program
-is measured against itself, so that differences between the models cost nobody.
+is measured against itself, so that differences between the models do not count.
 
 Needs a Python with mitsuba, numpy and PyYAML (--python), and an LLVM for Mitsuba's llvm variant."""
 

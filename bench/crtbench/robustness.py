@@ -1,6 +1,6 @@
-"""What robustness costs, and what it buys: the watertight triangle test against Möller and Trumbore's,
-offsets by each triangle's error bound against one fixed epsilon. The alternatives are patches of the
-kernel's texts in bench/alternatives, which OpenCL compiles at run time (CRT_KERNEL_DIR).
+"""The cost and the gain of robustness: the watertight triangle test against Möller and Trumbore's, offsets
+by each triangle's error bound against one fixed epsilon. The alternatives are patches of the kernel's texts
+in bench/alternatives, which OpenCL compiles at run time (CRT_KERNEL_DIR).
 """
 
 import shutil

@@ -27,7 +27,8 @@ FILM_BOUND = (
 
 
 class FilmDifference:
-    """How two films differ. `pixels`: whose sums, count or primitive differ in any bit; `exact_pixels`:
+    """Differences between two films. `pixels`: whose sums, count or primitive differ in any bit;
+    `exact_pixels`:
     whose count or primitive differs; `relative`: the largest difference of two sums, hi + lo, over the
     larger of them."""
 
@@ -63,8 +64,8 @@ class Film:
             )
         width, height, self.channels, aovs = struct.unpack_from("<4I", data, 32)
         self.pixels = width * height
-        # Two doubles for each channel, a count of 64 bits, and the primitive's number where the scene asks
-        # for it.
+        # Two doubles for each channel, a count of 64 bits, and the primitive's number where the scene
+        # requests it.
         self.strides = [self.channels * 16, 8] + ([4] if aovs & 8 else [])
         self.body = memoryview(self.unpacked(data, header_bytes))
         self.sums = self.body[:self.pixels * self.strides[0]].cast("d")

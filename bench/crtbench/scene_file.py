@@ -14,7 +14,7 @@ EXCLUSIVE = {"environment": [{"radiance"}, {"image", "scale", "rotation_deg", "u
 
 
 def without_excluded(section, below, above):
-    """What is left of an included section beside keys of the including one."""
+    """The rest of an included section next to keys of the including one."""
     gone = set()
     for form in EXCLUSIVE.get(section, []):
         if form & above.keys():

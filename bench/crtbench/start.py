@@ -1,5 +1,5 @@
-"""What it costs to begin: processes that only look, libraries that a render maps, and kernels compiled,
-cached and cold."""
+"""The cost of starting: processes that only look, libraries that a render maps, and kernels compiled, cached
+and cold."""
 
 import os
 import re

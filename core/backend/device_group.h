@@ -22,8 +22,8 @@ struct DeviceShare {
     std::string failure;        ///< Reason why it was dropped; empty while it works.
 };
 
-/// Which of `devices` a --device names: "all", indices as "0,2", or else one, as it stands, which the
-/// backend itself looks up. Throws crt::Error(Usage) for an index that is there twice or not at all.
+/// The members of `devices` that --device selects: "all", indices as "0,2", or else one, as it stands, which
+/// the backend itself looks up. Throws crt::Error(Usage) for an index that is there twice or not at all.
 std::vector<std::string> devicesNamed(const std::string& text, const std::vector<CrtDevice>& devices);
 
 /// The verbs of an Integrator for all devices together.

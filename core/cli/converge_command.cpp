@@ -93,11 +93,9 @@ OptionGroup where(State& state) {
 
 constexpr const char* kConvergeNotes =
             "\nRenders every scene with every backend and variant, repeatedly with different seeds, "
-            "measures "
-            "the error at 1, 2, 4 ... samples, and writes\n"
+            "measures the error at 1, 2, 4 ... samples, and writes\n"
             "one page: error against seconds with its interval, efficiency, bias, reliability of the "
-            "images' "
-            "own error estimates, and time by stage.\n"
+            "images' own error estimates, and time by stage.\n"
             "Without --reference, a quarter of --time is spent on making one.\n"
             "docs/error.md explains the terms. Python makes the page, with jinja2 and matplotlib; "
             "'python -m crt report DIR' does it later.\n"

@@ -36,8 +36,7 @@ std::string parseToken(const std::string& text) {
 
 constexpr const char* kViewNotes =
     "\nThe page shows the image as it converges. Drag to turn the camera around its target, or with Shift "
-    "or "
-    "the right button to move it;\n"
+    "or the right button to move it;\n"
     "the wheel changes the distance. A click shows the data of a pixel, and Ctrl with a click focuses a "
     "lens.\n"
     "crt reads the scene again whenever one of its files changes. The address contains a secret: everyone "

@@ -70,13 +70,11 @@ OptionGroup options(State& state) {
 constexpr const char* kWarmNotes =
             "\nA backend compiles a kernel for the features of a scene, and keeps it on disk: in "
             "CRT_CACHE_DIR, or in the folder crt of XDG_CACHE_HOME or of ~/.cache. The first render with "
-            "new "
-            "features waits for the compiler, or begins with a slower kernel. This command compiles now, so "
-            "that no render has to wait: after an installation, or before a job that many machines begin at "
-            "the same time.\n"
+            "new features waits for the compiler, or begins with a slower kernel. This command compiles "
+            "now, so that no render has to wait: after an installation, or before a job that many machines "
+            "begin at the same time.\n"
             "Kernels depend on the features of a scene, on its AOVs and on the device, and neither on "
-            "values "
-            "nor on the size of the image.\n"
+            "values nor on the size of the image.\n"
             "\nExamples:\n"
             "  crt warm scene.yaml\n"
             "  crt warm -b opencl configs/*.yaml\n";

@@ -1,4 +1,4 @@
-/// Which accelerator a scene gets, and the order in which it wants the triangles.
+/// Chooses the accelerator of a scene, and the order of its triangles.
 #pragma once
 
 #include "compile/bvh_build.h"
@@ -32,7 +32,7 @@ struct MeshTrees {
 };
 MeshTrees compileMeshTrees(const FlatScene& flat);
 
-/// Whether the backend finds all hits itself: rays start at the camera or at a surface, and surfaces lie
+/// True if the backend finds all hits itself: rays start at the camera or at a surface, and surfaces lie
 /// within 1.
 bool backendFindsHits(const Camera& camera, const Vec3d& centre, int scale_exponent,
                       const CompileOptions& options);

@@ -22,8 +22,8 @@ class BlobWriter {
 public:
     BlobWriter() { grow(sizeof(kernel::CrtScene)); }
 
-    /// Room for so many bytes in all, so that hundreds of megabytes are not moved while they grow.
-    /// Large ones are touched by all threads: the system's giving them takes longer than filling them.
+    /// Reserves room for this number of bytes in all, so that hundreds of megabytes are not moved while they
+    /// grow. Large ones are touched by all threads: the system's giving them takes longer than filling them.
     void reserve(std::size_t bytes) {
         lines_.reserve(linesFor(bytes));
         constexpr std::size_t kPage = 4096, kPart = std::size_t{4} << 20;
@@ -58,7 +58,7 @@ public:
         return {static_cast<std::uint32_t>(offset / 16), static_cast<std::uint32_t>(count)};
     }
 
-    /// What was appended, to fill it in when nothing will be appended any more.
+    /// The array that was appended, to be filled in when nothing more will be appended.
     template <class T>
     std::span<T> items(const kernel::CrtSpan& span) {
         return {reinterpret_cast<T*>(bytes() + std::size_t{span.offset} * 16), span.count};
@@ -73,7 +73,7 @@ private:
     using Line = CompiledScene::Line;
     static std::size_t linesFor(std::size_t bytes) { return (bytes + sizeof(Line) - 1) / sizeof(Line); }
     unsigned char* bytes() { return reinterpret_cast<unsigned char*>(lines_.data()); }
-    /// Where `bytes` more begin.
+    /// Offset at which `bytes` more begin.
     std::size_t room(std::size_t bytes) {
         const std::size_t offset = lines_.size() * sizeof(Line);
         // 64 GiB is what offsets of 16 bytes in 32 bits reach.

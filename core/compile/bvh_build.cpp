@@ -31,12 +31,12 @@ struct Split {
 };
 
 constexpr std::uint32_t kTrianglesAtATime = 1u << 14;  // triangles that a thread looks at, at a time
-constexpr std::uint32_t kSerial = 1u << 15;  // up to so many, one thread builds a whole tree of them
+constexpr std::uint32_t kSerial = 1u << 15;  // up to this number, one thread builds the whole tree
 
 /// 0.5 of it is the centre.
 float twiceCentroid(const TriangleBounds& b, std::size_t axis) { return b.lower[axis] + b.upper[axis]; }
 
-/// What is known of a range of triangles at once: its box, and the box of the centroids.
+/// Summary of a range of triangles: its box, and the box of the centroids.
 struct Extents {
     BvhBox box, centroids;
 
@@ -114,10 +114,10 @@ private:
     std::array<std::array<std::uint32_t, kBins>, 3> counts_{};
 };
 
-/// How a tree is made: should the better one be too deep for the kernel's stack, the next.
+/// Ways to build a tree: if a better one is too deep for the kernel's stack, the next is used.
 enum class Way { Improved, Plain, Median };
 
-/// Which way is taken depends on the number of triangles alone, never on that of threads.
+/// The choice depends on the number of triangles alone, never on that of threads.
 class Builder {
 public:
     Builder(const std::vector<TriangleBounds>& triangles, bool median_only, Stage& stage)

@@ -9,7 +9,7 @@ constexpr std::uint32_t kWidth = 4;
 constexpr float kNodeCost = 1.5f;             // of a wide node in triangle tests; flat between 1 and 2.5
 constexpr std::uint32_t kJoinedLeafSize = 4;  // of leaves that are joined here
 
-/// How a subtree is best made the children of a wide node.
+/// The best way to make a subtree the children of a wide node.
 struct Cut {
     /// Of 2, 3 and 4 children, how many of them its left side is to have.
     std::array<std::uint8_t, kWidth - 1> left{1, 1, 1};
@@ -17,7 +17,7 @@ struct Cut {
     bool is_leaf = true;
 };
 
-/// What rays cost that meet a subtree, made into at most 1 to 4 children: a node's or triangle's cost times
+/// Cost of rays that meet a subtree, made into at most 1 to 4 children: a node's or triangle's cost times
 /// the surface of the box around it.
 struct Costs {
     std::array<float, kWidth> of;

@@ -70,7 +70,7 @@ private:
         float best_gain = 0;
         std::uint32_t pivot = parent, beside = sibling(node);
         float gain = tree_[parent].box.halfArea();  // The parent goes away with the node.
-        BvhBox rest = tree_[beside].box;            // What the pivot holds without the node.
+        BvhBox rest = tree_[beside].box;            // The box of the pivot without the node.
         for (;;) {
             candidates_.push_back({gain, beside});
             while (!candidates_.empty()) {

@@ -13,7 +13,8 @@ namespace crt {
 
 struct Coat {
     /// Share of light from one direction that the coat reflects, at cosines in steps of 1/470: a table of as
-    /// many values as a spectrum has. Constant 0 for a smooth coat, which the kernel asks Fresnel about.
+    /// many values as a spectrum has. Constant 0 for a smooth coat, for which the kernel evaluates Fresnel's
+    /// equations.
     Spectrum albedo;
     /// Share of diffuse light from below that it sends back.
     double internal_reflectance = 0;
@@ -25,7 +26,7 @@ using Coats = std::map<std::pair<double, double>, Coat>;
 const Coat& coatOf(const Coats& coats, const Material& plastic);
 const Coat& coatOf(const Coats& coats, const Clearcoat& clearcoat);
 
-/// Whether a coat lies on it itself; what a material is made of has the coat, where it is made of others.
+/// True if it has a coat itself; of a composed material, the parts have the coat.
 inline bool hasClearcoat(const Material& material) {
     return material.clearcoat && !material.isComposed() && !material.transmits();
 }

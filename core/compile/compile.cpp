@@ -46,7 +46,7 @@ std::size_t smoothTrianglesOf(const FlatScene& flat) {
     return smooth;
 }
 
-/// How many records of a kind the scene and its meshes have: one for each primitive, or none.
+/// Number of records of a kind of the scene and its meshes: one for each primitive, or none.
 template <class T>
 std::size_t recordsOf(const FlatScene& flat, std::vector<T> FlatScene::*member) {
     std::size_t records = (flat.*member).size();
@@ -54,7 +54,7 @@ std::size_t recordsOf(const FlatScene& flat, std::vector<T> FlatScene::*member) 
     return records;
 }
 
-/// What the scene and its meshes have for each primitive.
+/// Records of the scene and its meshes for each primitive.
 template <class T>
 kernel::CrtSpan appendOfPrimitives(BlobWriter& blob, const FlatScene& flat,
                                    std::vector<T> FlatScene::*member) {
@@ -103,7 +103,7 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
     header.accelerator = accelerator.kind;
     MeshTrees trees = compileMeshTrees(flat);
     header.nodes = blob.append(accelerator.nodes);
-    accelerator.nodes = {};  // nobody asks for them again, and they may be hundreds of megabytes
+    accelerator.nodes = {};  // they are not needed again, and they may be hundreds of megabytes
     const std::size_t count = flat.triangles.size();
     header.triangle_count = static_cast<std::uint32_t>(count);
     const std::size_t primitive_count = primitivesOf(flat), slots = primitive_count + flat.instances.size();
@@ -257,8 +257,8 @@ void warnOfNearSurfaces(const Scene& scene, const CompiledScene& compiled) {
     if (const std::optional<CoplanarLight> found = findCoplanarLight(searched))
         logWarning(
             "{} lies in the plane of {} and overlaps it: rounding decides which of them is seen, and the "
-            "image is wrong there; move the light {:.3g} "
-            "or more towards the side that it lights, or cut a hole for it",
+            "image is wrong there; move the light {:.3g} or more towards the side that it lights, or cut a "
+            "hole for it",
             objectOf(scene, compiled, found->light), objectOf(scene, compiled, found->surface),
             found->least_gap);
     if (const CoarseLights found = findCoarseLights(compiled); found.lights > 0)

@@ -22,7 +22,7 @@ struct CompiledScene {
     std::uint64_t triangles = 0, shapes = 0, instances = 0, emitters = 0, objects = 0, nodes = 0;
     std::uint64_t instanced_triangles = 0;  ///< Of the meshes that instances show, each counted once.
     std::uint64_t images = 0, texel_bytes = 0;  ///< Of textures.
-    double camera_reach = 0;          ///< How far from `centre` a camera may be that it serves, too.
+    double camera_reach = 0;          ///< Largest distance from `centre` of a camera for which it is valid.
     int scale_exponent = 0;           ///< World lengths were multiplied by 2^scale_exponent after centring.
     Vec3d centre{};                   ///< In the author's units.
     bool without_nodes = false;  ///< Scenes of CRT_ACCELERATOR_BVH: left to a backend that brings its own
@@ -30,7 +30,8 @@ struct CompiledScene {
     std::string hash;  ///< 32 hex digits: what a film of this scene belongs to (scene_identity.h).
     double build_seconds = 0;         ///< BVH; 0 where none was built.
     double compile_seconds = 0;
-    std::vector<std::pair<std::string, std::string>> left_out;  ///< What this scene does not need, and why.
+    std::vector<std::pair<std::string, std::string>> left_out;  ///< The features that this scene does not
+                                                                ///< need, and the reasons.
 
     unsigned char* data() { return reinterpret_cast<unsigned char*>(blob.data()); }
     const unsigned char* data() const { return reinterpret_cast<const unsigned char*>(blob.data()); }
@@ -38,8 +39,7 @@ struct CompiledScene {
     const kernel::CrtScene& header() const { return *reinterpret_cast<const kernel::CrtScene*>(data()); }
 };
 
-/// What the backend that will read the blob brings itself (crt_backend.h): nothing is built that it would
-/// not read.
+/// Structures that the backend builds itself (crt_backend.h), which are left out of the blob.
 struct CompileOptions {
     double accelerator_reach = 0;  ///< Of the backend's own acceleration structure; 0: it needs the BVH.
 };

@@ -17,13 +17,13 @@ struct Corners {
 Corners cornersOf(const unsigned char* blob, std::uint32_t slot);
 double largestEdge(const Corners& c);
 
-/// Whether the corners of the smaller lie in the plane of the larger, whose normal is known better, as well
+/// True if the corners of the smaller lie in the plane of the larger, whose normal is known better, as well
 /// as rays can tell.
 bool inOnePlane(const Corners& a, const Corners& b);
 /// True if the distance of the point from the triangle is at most `room`.
 bool isOn(const Vec3d& point, const Corners& c, double room);
-/// Whether two triangles of one plane have area in common: by the separating axes of their edges. What
-/// merely touches has not.
+/// True if two triangles of one plane have area in common: by the separating axes of their edges. Triangles
+/// that merely touch have not.
 bool overlap(const Corners& a, const Corners& b);
 
 }  // namespace crt

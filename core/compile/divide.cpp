@@ -24,7 +24,7 @@ public:
 
     Vec3d operator()(const Vec3d& p) const { return (p - focus_.centre) * (1 / focus_.detail); }
 
-    /// Whether the edge must be halved. The answer is the same for (b, a), so that neighbours agree.
+    /// True if the edge must be halved. The answer is the same for (b, a), so that neighbours agree.
     static bool isLong(const Vec3d& a, const Vec3d& b) {
         if (dot(b, b) < dot(a, a)) return isLong(b, a);
         const Vec3d edge = b - a;

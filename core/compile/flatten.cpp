@@ -37,7 +37,7 @@ bool hasTexture(const Scene& scene, bool of_vertices) {
     });
 }
 
-/// Whether texture coordinates say which way a surface is rougher.
+/// True if texture coordinates determine the direction of a surface's anisotropy.
 bool hasTangents(const Scene& scene) {
     return std::any_of(scene.materials.begin(), scene.materials.end(),
                        [](const Material& m) { return m.anisotropy > 0; });
@@ -68,8 +68,8 @@ bool hasArea(const std::array<Vec3d, 3>& p) {
     return dot(n, n) > 1e-30 * std::max(dot(a, a), dot(b, b));
 }
 
-/// Triangles of the scene, a part of them at a time. Corners in double are worked out anew by each pass
-/// rather than stored: they would be half of the memory that a scene takes.
+/// Triangles of the scene, a part of them at a time. Each pass computes corners in double again instead of
+/// storing them: they would be half of the memory that a scene takes.
 class Flattener {
 public:
     Flattener(const Scene& scene, std::optional<std::size_t> only)
@@ -128,7 +128,7 @@ private:
         std::uint64_t without_area = 0;
         for (const Part& part : parts_) without_area += part.without_area;
         if (without_area == 0) return;
-        // Nobody sees them: they have no part in centre and scale.
+        // They are invisible: they do not affect centre and scale.
         logWarning("{} triangle{} no area and will not be seen", without_area,
                    without_area == 1 ? " has" : "s have");
         if (without_area < flat_.triangles.size() || !shapes_.empty() || !instances_.empty())

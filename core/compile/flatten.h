@@ -59,7 +59,7 @@ struct FlatScene {
     std::size_t firstInstance() const { return triangles.size() - instances.size(); }
 };
 
-/// An object whose mesh is stored once, in coordinates of its own, within ±1.
+/// An object whose mesh is stored once, in its own coordinates, within ±1.
 struct InstancedMesh {
     FlatScene flat;
     std::array<Vec3d, 2> box{};  ///< Lower and upper corner, of what float has.
@@ -69,8 +69,8 @@ struct InstancedMesh {
 /// transform moves a vertex to infinity or changes the form of a shape.
 FlatScene flattenScene(const Scene& scene);
 
-/// Fills in those of the smooth triangles, in their order. They are worked out from the scene anew: stored
-/// beside the blob they would be a third of the memory that a smooth mesh takes.
+/// Fills in those of the smooth triangles, in their order. They are computed from the scene again: stored
+/// next to the blob they would be a third of the memory that a smooth mesh takes.
 void flattenNormals(const Scene& scene, const FlatScene& flat, std::span<kernel::CrtNormals> normals);
 
 }  // namespace crt

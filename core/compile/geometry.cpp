@@ -107,7 +107,7 @@ std::optional<std::size_t> cornerAcrossCommonEdge(const FlatScene& flat, std::si
     return std::nullopt;
 }
 
-constexpr double kPatchHeight = 4 * 0x1p-24;  ///< What lies in one plane: crt_patch_slack has room for it.
+constexpr double kPatchHeight = 4 * 0x1p-24;  ///< Triangles in one plane: crt_patch_slack has room for them.
 constexpr double kPatchArea = 1.25;           ///< Of the parallelogram, over that of its two triangles.
 
 /// A patch of triangle `id`, and of `other` unless it is CRT_NONE. Nothing where they do not make one.
@@ -157,7 +157,7 @@ std::optional<kernel::CrtPatch> patchOf(const FlatScene& flat, std::uint32_t id,
     return patch;
 }
 
-/// Whether a triangle can come between two points of the scene: not if the whole scene lies on one side of
+/// True if a triangle can come between two points of the scene: not if the whole scene lies on one side of
 /// its plane, as it does for the walls of a convex room.
 bool canOcclude(const FlatScene& flat, std::size_t id) {
     const Vec3d o = vertexOf(flat, id, 0);

@@ -35,7 +35,7 @@ std::array<Vec3d, 2> boxOf(const FlatScene& mesh) {
     return box;
 }
 
-/// What holds the mesh's box when it is moved.
+/// A box that holds the mesh's box after a transform.
 std::array<Vec3d, 2> movedBox(const double* m, const std::array<Vec3d, 2>& box) {
     std::array<Vec3d, 2> moved;
     for (std::size_t k = 0; k < 3; ++k) {
@@ -85,9 +85,9 @@ double rowNorm(const Affine& m) {
     return norm;
 }
 
-/// How much larger boxes must be, in the mesh's coordinates, than what is in them, for a ray from o:
-/// slack_per_length · (|o.x| + |o.y| + |o.z|) + slack. A ray's origin is rounded by γ(5) of ‖to_mesh‖
-/// (|o| + 1), its direction by γ(4) of ‖to_mesh‖ times its length to the last point of the scene,
+/// The margin of boxes around their contents, in the mesh's coordinates, for a ray from o: slack_per_length
+/// · (|o.x| + |o.y| + |o.z|) + slack. A ray's origin is rounded by γ(5) of ‖to_mesh‖ (|o| + 1), its
+/// direction by γ(4) of ‖to_mesh‖ times its length to the last point of the scene,
 /// |o| + 2; corners of triangles in the scene by γ(4) of ‖to_world‖ and 1; and the triangle test
 /// accepts what CRT_BOX_PADDING says. γ(16) covers each.
 void setSlack(kernel::CrtInstance& record, const Affine& to_world, const Affine& to_mesh) {

@@ -21,8 +21,8 @@ struct PlacedMesh {
     Vec3d lower{}, upper{};    ///< A box that holds it.
 };
 
-/// Whether rays can be taken back through the transform. Where it flattens the mesh, or nearly does, a place
-/// is written out as triangles.
+/// True if rays can be transformed back. Where it flattens the mesh, or nearly does, a place is written out
+/// as triangles.
 bool canInstance(const Matrix4d& transform);
 
 /// `flat` is an object at its origin.

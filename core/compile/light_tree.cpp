@@ -167,7 +167,7 @@ private:
         std::size_t axis = 0, bucket = 0;
     };
 
-    /// Where the second half begins; the order of lights is changed so that halves lie together.
+    /// Start of the second half; the order of lights is changed so that halves lie together.
     std::size_t split(std::size_t first, std::size_t end, int depth) {
         const auto begin = order_.begin();
         const auto from = begin + static_cast<std::ptrdiff_t>(first),

@@ -48,8 +48,8 @@ double brightness(const Spectrum& radiance) {
     return xyz[0] + xyz[1] + xyz[2] + 1e-6 * radiance.max();
 }
 
-/// Whether rays may pass the triangle. What light sampling finds of such an emitter would have to be asked
-/// for its opacity there; scattered rays find what is there.
+/// True if rays may pass the triangle. Light sampling would need the opacity at each sampled point of such
+/// an emitter; scattered rays find it without extra work.
 bool isPassable(const Scene& scene, const FlatTriangle& triangle) {
     const auto material = static_cast<std::size_t>(triangle.material);
     return triangle.material >= 0 && material < scene.materials.size() &&

@@ -1,4 +1,4 @@
-/// What shines: emitters among the triangles, how one is chosen, and the environment.
+/// The light sources: emitters among the triangles, the choice of one, and the environment.
 #pragma once
 
 #include "compile/accelerator.h"
@@ -37,10 +37,10 @@ LightPart compileLights(const Scene& scene, const FlatScene& flat,
 /// The lights, and behind them the tree.
 kernel::CrtSpan appendLights(const LightPart& part, BlobWriter& blob);
 
-/// Whether the environment is among the lights.
+/// True if the environment is among the lights.
 bool samplesEnvironment(const Scene& scene);
 
-/// Whether shadow rays leave the scene: towards its environment, or lights without a surface.
+/// True if shadow rays leave the scene: towards its environment, or lights without a surface.
 bool shadowRaysLeave(const Scene& scene);
 
 /// The spectrum of the environment, where there is one and the view shows it; otherwise null.

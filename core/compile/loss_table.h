@@ -28,7 +28,7 @@ struct Interface {
 /// The surfaces of the rows of a table, in order.
 struct Across {
     std::vector<Interface> interfaces{{}};
-    double first = 0, step = 1;  ///< Of what the kernel looks rows up by.
+    double first = 0, step = 1;  ///< Properties by which the kernel looks up rows.
 };
 
 struct LossPlan {

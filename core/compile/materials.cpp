@@ -26,10 +26,10 @@ const Material& fallbackMaterial() {
     return grey;
 }
 
-/// What a material is made of has the fuzz, where it is made of others.
+/// For a composed material, its parts carry the fuzz.
 bool hasFuzz(const Material& material) { return material.fuzz > 0 && !material.isComposed(); }
 
-/// Whether the scene has the material that a triangle names.
+/// True if the scene has the material of a triangle.
 bool isKnown(const FlatTriangle& triangle, std::size_t scene_materials) {
     return triangle.material >= 0 && static_cast<std::size_t>(triangle.material) < scene_materials;
 }
@@ -147,7 +147,7 @@ std::vector<const Material*> usedMaterials(const Scene& scene, const FlatScene& 
     };
     use(flat);
     for (const InstancedMesh& mesh : flat.meshes) use(mesh.flat);
-    // What is made of others comes in any order.
+    // Composed materials come in any order.
     for (int depth = 0; depth < kDeepestComposition + kDeepestOpenPbr; ++depth)
         for (std::size_t i = 0; i < count; ++i)
             if (used[i] && scene.materials[i].isComposed())

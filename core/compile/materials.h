@@ -1,4 +1,4 @@
-/// What surfaces are made of: materials, and what each triangle has of them.
+/// Compiles materials, and the data of each triangle for them.
 #pragma once
 
 #include "compile/coat.h"
@@ -22,7 +22,7 @@ namespace crt {
 /// none, where there are such faces. Null where no triangle has it, or nothing is scattered in this view.
 std::vector<const Material*> usedMaterials(const Scene& scene, const FlatScene& flat);
 
-/// What is worked out for materials before rendering.
+/// Data computed for materials before rendering.
 struct MaterialTables {
     Coats coats;
     Compensations compensations;
@@ -48,7 +48,7 @@ std::uint32_t mediumBits(std::size_t media);
 MaterialPart compileMaterials(const std::vector<const Material*>& materials, const MaterialTables& tables,
                               SpectrumTable& spectra, const TexturePart& textures);
 
-/// How the materials are composed, in their order; none where all are plain and opaque.
+/// Compositions of the materials, in their order; empty if all are plain and opaque.
 std::vector<kernel::CrtComposition> compileCompositions(const std::vector<const Material*>& materials,
                                                         const TexturePart& textures);
 

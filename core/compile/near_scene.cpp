@@ -36,14 +36,14 @@ TriangleBounds boundsOf(const CrtTriangle& triangle, float padding) {
 /// one may look marked, never the other way round.
 class MarkedCells {
 public:
-    /// Cells about as large as the triangles of a surface of so many.
+    /// Cells about as large as the triangles of a surface with this number of triangles.
     explicit MarkedCells(std::size_t triangles)
         : side_(static_cast<float>(std::clamp<std::size_t>(
               std::bit_ceil(static_cast<std::size_t>(std::sqrt(static_cast<double>(triangles)))), 64,
               1024))),
           bits_(kBits / 64) {}
 
-    /// Returns false when so many cells are marked that it is no use.
+    /// Returns false if the search is pointless because too many cells are marked.
     bool mark(const TriangleBounds& box) {
         const Range range = rangeOf(box);
         marked_ += range.cells();
@@ -113,8 +113,8 @@ std::vector<std::uint32_t> slotsNearAsked(const CompiledScene& scene, const kern
     const auto* primitives = CRT_ARRAY(CrtPrimitive, scene.data(), header.primitives);
     const std::uint32_t count = header.triangle_count;
     const float largest = largestClearance(faces, count);
-    // Whatever near_surfaces.h reaches for begins within this of the triangle that it asks about: rays go as
-    // far as the largest clearance, and begin some epsilon off.
+    // All surfaces that near_surfaces.h reaches lie within this distance of the triangle: rays go as far as
+    // the largest clearance, and begin some epsilon off.
     const float reach = 2 * largest + 64 * CRT_EPSILON;
 
     MarkedCells cells(count);

@@ -25,7 +25,7 @@ std::vector<std::uint32_t> askedTriangles(std::uint64_t triangles);
 /// findCoplanarLight asks about emitters whose numbers are multiples of this.
 std::uint64_t askedEmitterStep(std::uint64_t emitters);
 
-/// Of so many faces; 0 where there is none.
+/// Of this number of faces; 0 if there are none.
 float largestClearance(const kernel::CrtFace* faces, std::size_t count);
 
 /// A lamp in the plane of another surface, which it overlaps: rays meet both at one distance but for

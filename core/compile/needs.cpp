@@ -21,7 +21,7 @@ static_assert((0ull CRT_FEATURE_LIST(CRT_FEATURE_SUM)) == CRT_FEATURES_ALL, "two
 
 bool isPath(const Scene& scene) { return scene.integrator.type == IntegratorType::Path; }
 
-/// Whether light is ever scattered; if not, materials, light sampling and roulette have nothing to do.
+/// True if light is ever scattered; if not, materials, light sampling and roulette have nothing to do.
 bool scatters(const Scene& scene) { return isPath(scene) && scene.integrator.max_depth > 0; }
 
 }  // namespace

@@ -16,7 +16,7 @@ namespace crt {
 /// `header` is complete but for its features.
 std::uint64_t featuresOf(const Scene& scene, const kernel::CrtScene& header, const MaterialPart& materials);
 
-/// What is left out, and why.
+/// A feature that is left out, and the reason.
 using LeftOut = std::vector<std::pair<std::string, std::string>>;
 /// `header` is complete. `occluders`: triangles that shadow rays are tested against by the brute-force loop.
 LeftOut leftOut(const Scene& scene, const kernel::CrtScene& header, std::size_t occluders,

@@ -7,8 +7,7 @@
 namespace crt {
 namespace {
 
-/// Objects that would be more triangles than this are instanced where nobody says. Below, rays are faster
-/// among triangles.
+/// Objects with more triangles than this are instanced by default. Below, rays are faster among triangles.
 constexpr std::uint64_t kSharedFrom = std::uint64_t{1} << 22;
 
 /// Rows of the cofactor matrix of the linear part: transforms normals, and its sign is that of the

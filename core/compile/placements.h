@@ -25,7 +25,7 @@ struct Placement {
     std::size_t first;     ///< Number of its first triangle in the scene.
     std::uint32_t number;  ///< Among all places of all objects.
 
-    /// Which corner of the mesh's triangle is the k-th of the placed one.
+    /// The corner of the mesh's triangle that is the k-th of the placed one.
     std::size_t from(std::size_t k) const { return mirrored && k > 0 ? 3 - k : k; }
 
     /// In the author's units, for a triangle of the mesh.
@@ -38,10 +38,11 @@ struct Placement {
 /// Of all its places.
 std::uint64_t trianglesOf(const Scene& scene, const Object& object);
 
-/// Whether any of its triangles does.
+/// True if any of its triangles does.
 bool emits(const Scene& scene, const Object& object);
 
-/// Whether the object's places share one mesh. Lamps do not: each of their triangles is a light of its own.
+/// True if the object's places share one mesh. Emitting ones do not: each of their triangles is a separate
+/// light.
 bool sharesMesh(const Scene& scene, const Object& object);
 
 /// In the author's units.
@@ -50,7 +51,7 @@ Vec3d transformPoint(const Matrix4d& m, const Vec3d& p);
 /// Meshes that stand for those of the scene's objects (divide.h).
 using DividedMeshes = std::map<const Object*, Mesh>;
 
-/// What becomes triangles: of the scene, or of one object alone, at its origin.
+/// Placements that become triangles: of the scene, or of one object alone, at its origin.
 std::vector<Placement> placementsOf(const Scene& scene, std::optional<std::size_t> only,
                                     const DividedMeshes& divided = {});
 

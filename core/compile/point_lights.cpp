@@ -18,7 +18,7 @@ bool isAtInfinity(PointLightType type) {
     return type == PointLightType::Directional || type == PointLightType::Sun;
 }
 
-/// Whether its strength is an intensity, which is by solid angle.
+/// True if its strength is an intensity, which is per solid angle.
 bool shinesFromPoint(PointLightType type) {
     return type == PointLightType::Point || type == PointLightType::Spot || type == PointLightType::Ies;
 }

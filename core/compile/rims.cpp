@@ -50,8 +50,8 @@ public:
     }
 
 private:
-    /// Where thousands of rims and surfaces lie on one spot each could touch each. When so many tests have
-    /// been made, the rims that are left are taken to be touched.
+    /// If thousands of rims and surfaces lie at one place, each could touch each. After this number of
+    /// tests, the remaining rims are assumed to be touched.
     static constexpr std::uint64_t kLeastTests = 1000000, kTestsEach = 64;
 
     void add(std::uint32_t index, double z, bool upper) {

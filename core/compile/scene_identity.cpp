@@ -23,7 +23,7 @@ private:
     ByteHash hash_;
 };
 
-/// The header without what names accelerators and kernels, and without places in the blob. What is added to
+/// The header without what names accelerators and kernels, and without places in the blob. Every member of
 /// CrtScene belongs to the identity until it is cleared here: a setting that was forgotten would mix films.
 kernel::CrtScene settingsOf(kernel::CrtScene header) {
     header.features = 0;
@@ -82,7 +82,7 @@ std::string sceneIdentity(const unsigned char* blob, const std::vector<std::arra
         texture.texels = {};
         hash.add(&texture, 1, sizeof texture);
     }
-    // What is lost follows from the materials; a record names its rows by their place in the blob.
+    // The losses follow from the materials; a record names its rows by their place in the blob.
     const CrtLoss* losses = CRT_ARRAY(CrtLoss, blob, header.losses);
     for (std::uint32_t i = 0; i < header.losses.count; ++i)
         hash.add(CRT_ARRAY(f32, blob, losses[i].rows), losses[i].rows.count, sizeof(f32));

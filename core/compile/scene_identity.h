@@ -1,6 +1,6 @@
-/// What a film belongs to: the scene as the samples see it, its settings, and the version of the bits.
-/// Whatever only finds hits sooner is left out, so that another accelerator, a better tree or a smaller
-/// kernel goes on with the films that are there.
+/// The identity of a film: the scene as the samples see it, its settings, and the version of the bits. Data
+/// that only speed up the search for hits are left out, so that existing films can be continued with another
+/// accelerator, a better tree or a smaller kernel.
 #pragma once
 
 #include "kernel/dialect/layout.h"

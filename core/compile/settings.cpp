@@ -23,7 +23,7 @@ Vec3d normalise(const Vec3d& v) {
     return near_one * (1.0 / std::sqrt(dot(near_one, near_one)));
 }
 
-/// What the film holds: the channels of first hits that outputs ask for, and those that tell its error.
+/// Contents of the film: the channels of first hits that outputs need, and those for its error.
 std::uint32_t filmAovs(const Scene& scene, std::uint32_t aovs) {
     return (aovs & kAovsOfFirstHits) | (replicatesOf(scene) > 1 ? kAovReplicates : kAovSquares);
 }

@@ -1,4 +1,4 @@
-/// What a scene says besides surfaces and lights: film, camera, sampler and integrator.
+/// The settings of a scene besides surfaces and lights: film, camera, sampler and integrator.
 #pragma once
 
 #include "compile/flatten.h"

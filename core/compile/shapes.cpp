@@ -20,7 +20,7 @@ struct Reach {
 
 Reach reachOf(const Quadric& shape, double from_z, double to_z, double radius, double along) {
     const double across = std::sqrt(std::max(0.0, 1 - along * along));
-    // How far the surface goes this way, with the axis pointing `cosine` along it.
+    // Extent of the surface in this direction, with the axis pointing `cosine` along it.
     const auto farthest = [&](double cosine) {
         if (shape.type == QuadricType::Disk) return radius * across;
         if (shape.type == QuadricType::Cylinder)
@@ -107,8 +107,8 @@ FlatShape flatShape(const PlacedShape& shape, const Vec3d& centre, int scale_exp
     const double extent = own.type == QuadricType::Disk
                               ? radius
                               : std::min(to_z, radius + height) - std::max(from_z, -radius - height);
-    // What ends in one circle shall overlap by rounding rather than gape; but by less than the clearance of
-    // its neighbour, whose rays would meet the lip.
+    // Surfaces that end in one circle shall overlap by rounding rather than leave a gap; but by less than
+    // the clearance of the neighbour, whose rays would meet the lip.
     const float rounding =
         kernel::crt_shape_clearance(static_cast<float>(coordinate), static_cast<float>(radius + height / 4));
     flat.lip = static_cast<float>(std::min(static_cast<double>(rounding) / 2, extent / 8));

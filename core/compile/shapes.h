@@ -28,9 +28,9 @@ std::vector<PlacedShape> placedShapes(const Scene& scene);
 /// A shape of the compiled scene.
 struct FlatShape {
     kernel::CrtShape record;
-    float clearance;  ///< How far off it a ray must start (shapes.h).
-    float margin;     ///< How far from its rims.
-    float lip;        ///< How far beyond a rim it is met, where another surface touches it (rims.h).
+    float clearance;  ///< Distance from it at which a ray must start (shapes.h).
+    float margin;     ///< Distance from its rims.
+    float lip;        ///< Distance beyond a rim at which it is met, if another surface touches it (rims.h).
     std::array<float, 9> box;  ///< As CrtTriangle has it.
 };
 

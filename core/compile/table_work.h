@@ -10,7 +10,7 @@ namespace crt {
 
 class TableWork {
 public:
-    /// One more table, of so many steps: directions of microfacets, most often.
+    /// One more table, with this number of steps: directions of microfacets, most often.
     void add(double steps, const Material& material);
 
     /// Throws crt::Error(Scene) where more than kFewTables would take longer than kMostTableSeconds, or any

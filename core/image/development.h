@@ -1,4 +1,4 @@
-/// How a film becomes the colours of an image: settings that no sample depends on, so that they can be
+/// Converts a film to the colours of an image: settings that do not affect samples, so that they can be
 /// changed after the render (`crt develop`).
 #pragma once
 

@@ -1,4 +1,4 @@
-/// Which way up a camera held its pixels. Part of the image module (image_module.h).
+/// The orientation of an image that a camera stored. Part of the image module (image_module.h).
 #pragma once
 
 #include <cstdint>

@@ -13,8 +13,8 @@ namespace crt {
 /// Row-major, for points as rows: p' = p · M, as OpenEXR has it.
 using RowMatrix4d = std::array<double, 16>;
 
-/// An image plane set: named float channels, row-major, top row first. What image_io writes and compare
-/// reads.
+/// An image plane set: named float channels, row-major, top row first. The images that image_io writes and
+/// compare reads.
 struct Image {
     std::uint32_t width = 0, height = 0;
     std::vector<std::string> channels;      ///< "R","G","B","Albedo.R",…,"sampleCount","id.primitive"

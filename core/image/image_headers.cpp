@@ -97,7 +97,7 @@ const std::map<std::string_view, std::uint32_t>& fixedSizes() {
     return sizes;
 }
 
-/// What a part of an EXR file says of its pixels.
+/// Header of a part of an EXR file.
 struct Part {
     std::uint64_t width = 0, height = 0, channels = 0;
 };
@@ -124,8 +124,8 @@ void checkPixels(const std::string& path, std::uint64_t width, std::uint64_t hei
         kLossyBytesAByte * kDeflateBytesAByte * static_cast<double>(std::filesystem::file_size(path)));
 }
 
-/// The value of an attribute, by "OpenEXR File Layout" (openexr.com). What is not named here is opaque to
-/// OpenEXR, too.
+/// The value of an attribute, by "OpenEXR File Layout" (openexr.com). Attributes that are not listed here
+/// are opaque to OpenEXR, too.
 void checkValue(const std::string& path, const std::string& name, const std::string& type,
                 std::string_view value, Part& part) {
     const std::string what = fmt::format("its attribute '{}'", name);

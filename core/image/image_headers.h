@@ -11,7 +11,7 @@
 
 namespace crt::image {
 
-/// One sentence, "its attribute 'x' …", for whoever named the file.
+/// One sentence, "its attribute 'x' …", to follow the name of the file.
 struct DamagedHeader : std::runtime_error {
     using std::runtime_error::runtime_error;
 };
@@ -29,7 +29,7 @@ void checkMemory(std::uint64_t width, std::uint64_t height, std::uint64_t bytes_
 /// Rows that OpenImageIO reads at a time, into memory for as many however few the image has. (It takes no
 /// fewer; left alone, it takes 256.)
 inline constexpr std::uint64_t kStripRows = 64;
-/// Throws DamagedHeader when so many rows would take more than a gigabyte, and more than the image.
+/// Throws DamagedHeader if this number of rows would take more than a gigabyte, and more than the image.
 void checkRows(std::uint64_t width, std::uint64_t height, std::uint64_t bytes_a_pixel);
 
 }  // namespace crt::image

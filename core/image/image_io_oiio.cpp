@@ -1,6 +1,6 @@
 // The image codec module: EXR and PNG through OpenImageIO, JPEG through libjpeg-turbo, sound PNG files that
-// are textures through libdeflate, Radiance HDR and TGA by readers of its own, behind image_module.h. Built
-// as a library of its own; nothing else in crt includes OpenImageIO.
+// are textures through libdeflate, Radiance HDR and TGA by its own readers, behind image_module.h. Built as
+// a separate library; nothing else in crt includes OpenImageIO.
 //
 // Over 450 lines: it is all of the module, and all that knows OpenImageIO.
 #include "image/image_headers.h"
@@ -49,7 +49,7 @@ bool contains(const Names& names, const char* name) {
                        [name](const char* n) { return std::strcmp(n, name) == 0; });
 }
 
-/// What the functions below throw on the way to guarded(), which never lets it out.
+/// The functions below throw this to guarded(), which catches it.
 struct Failure {
     std::string reason;
 };
@@ -167,7 +167,7 @@ void writeWith(const char* format, const char* path, const ImageSpec& spec, cons
         file.requireNoFailure();
         throw;
     } catch (const Failure&) {
-        file.requireNoFailure();  // What the disk said is better than what the library makes of it.
+        file.requireNoFailure();  // The error of the disk is more precise than that of the library.
         throw;
     }
     file.close();
@@ -245,7 +245,7 @@ std::int32_t writePng(const char* path, std::uint32_t width, std::uint32_t heigh
     });
 }
 
-/// What read() hands out, with what it points to.
+/// The image that read() returns, with the data that it points to.
 struct OwnedImage : CrtImagePlanes {
     OwnedImage() : CrtImagePlanes{} {}
     std::vector<std::string> float_names, integer_names, metadata_text;
@@ -262,10 +262,10 @@ bool isInteger(const ImageSpec& spec, int channel) {
     return type.basetype == TypeDesc::UINT32 || type.basetype == TypeDesc::INT32;
 }
 
-/// What people compare renders with, by the bytes with which such a file begins. Not left to OpenImageIO: it
-/// hands a file that it does not know to each of some thirty readers in turn, video codecs among them, which
-/// costs 0.2 s and trusts the least hardened of them with whatever the file holds. TIFF and JPEG are not
-/// among them: their readers did not stand fuzzing (docs/decisions/0005).
+/// Formats of renders to compare, by the first bytes of such a file. Not left to OpenImageIO: it hands a
+/// file that it does not know to each of some thirty readers in turn, video codecs among them, which costs
+/// 0.2 s and trusts the least hardened of them with whatever the file holds. TIFF and JPEG are not among
+/// them: their readers did not stand fuzzing (docs/decisions/0005).
 struct KnownFormat {
     const char* name;  ///< As OpenImageIO calls it.
     std::string_view signature;
@@ -276,7 +276,7 @@ constexpr KnownFormat kKnownFormats[] = {
     {"png", std::string_view("\x89PNG\r\n\x1a\n", 8), crt::image::checkPngHeader},
 };
 
-/// How a file begins.
+/// First bytes of a file.
 std::string beginningOf(const char* path) {
     char beginning[16] = {};
     std::ifstream file(path, std::ios::binary);
@@ -404,7 +404,7 @@ std::int32_t readImage(const char* path, std::uint64_t most_bytes, const CrtImag
                 owned->chromaticities = owned->primaries.data();
                 continue;
             }
-            // What OpenImageIO says of its own is not in the file.
+            // Attributes that OpenImageIO adds itself are not in the file.
             const bool scalar = type == TypeDesc::STRING || type == TypeDesc::INT || type == TypeDesc::FLOAT;
             std::string value = scalar ? attribute.get_string() : std::string();
             if (value.empty() || name.rfind("oiio:", 0) == 0) continue;
@@ -465,7 +465,7 @@ std::uint32_t texelType(const ImageSpec& spec) {
 
 enum class Part { Color, Alpha };
 
-/// Where the pixels of a file lie in its picture: an EXR's data window may be smaller or larger than its
+/// The rectangle of a file's pixels in its image: an EXR's data window may be smaller or larger than its
 /// display window.
 struct Placement {
     explicit Placement(const ImageSpec& spec)

@@ -1,5 +1,4 @@
-/// What an image file says of how its values came about, under names that whoever writes and whoever
-/// compares share.
+/// Metadata of an image file about the origin of its values, under names that writers and comparisons share.
 #pragma once
 
 #include "image/development.h"
@@ -22,7 +21,7 @@ inline constexpr const char* kWhiteLuminanceKey = "whiteLuminance";
 /// (https://github.com/AcademySoftwareFoundation/ColorInterop).
 inline constexpr const char* kColorInteropIdKey = "colorInteropID";
 inline constexpr const char* kDisplaySrgbId = "srgb_rec709_display";
-/// What display formats get, in files of floats that got neither: as the two above.
+/// The settings of display formats, in files of floats that got neither: as the two above.
 inline constexpr const char* kDisplayExposureKey = "crt/displayExposure";
 inline constexpr const char* kDisplayWhiteBalanceKey = "crt/displayWhiteBalance";
 /// Student's 95 % half-width of each pixel: StdError.Y times the quantile of its degrees of freedom.
@@ -42,7 +41,7 @@ std::optional<double> errorDegreesOfFreedom(const Image& image);
 /// Space of the image's primaries; sRGB when it names none. Nothing when they are those of another space.
 std::optional<ColorSpace> colorSpaceOf(const Image& image);
 
-/// What else than light decides an image's values.
+/// Settings other than light that determine an image's values.
 struct ColorConditions {
     std::optional<double> exposure_ev;                    ///< Nothing: the file does not say.
     std::optional<std::string> white_balance;  ///< As in kWhiteBalanceKey; nothing: the file does not say.
@@ -50,14 +49,14 @@ struct ColorConditions {
 };
 ColorConditions colorConditions(const Image& image);
 
-/// Why values under the one and the other cannot be compared, one sentence without a full stop, in which `a`
-/// and `b` name them: other exposure, white balance or colour space. Empty when both say the same, or
+/// Reason why values under the two settings cannot be compared, one sentence without a full stop, in which
+/// `a` and `b` name them: other exposure, white balance or colour space. Empty when both say the same, or
 /// nothing.
 std::string conflictOf(const ColorConditions& conditions_a, const std::string& a,
                        const ColorConditions& conditions_b, const std::string& b);
 
-/// What only one of them says, where it is not what is usual (0 stops, no white balance, sRGB), one sentence
-/// each: the other is taken to be alike.
+/// Settings that only one of them states and that are not the default (0 stops, no white balance, sRGB), one
+/// sentence each: the other is assumed to be equal.
 std::vector<std::string> unknownConditions(const ColorConditions& conditions_a, const std::string& a,
                                            const ColorConditions& conditions_b, const std::string& b);
 

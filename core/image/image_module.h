@@ -26,7 +26,7 @@ typedef struct CrtImageText {
     const char *value;
 } CrtImageText;
 
-/* What a file says of its pixels that is not applied to them; 0: it says nothing. */
+/* Properties of the pixels that a file states and crt does not apply; 0: none. */
 typedef struct CrtUnappliedTags {
     float gamma;          /* PNG: gAMA, where no sRGB overrides it */
     float exposure;       /* Radiance HDR: what its pixels were multiplied by */
@@ -62,7 +62,7 @@ typedef struct CrtImagePlanes {
 #define CRT_TEXELS_UINT16 1u
 #define CRT_TEXELS_FLOAT 2u
 
-/* What the pixels of an image are that is a value of a scene: as the file holds them, without alpha. */
+/* The pixels of an image that is a value of a scene: as the file holds them, without alpha. */
 typedef struct CrtTexelsInfo {
     uint32_t width, height;
     uint32_t channels;             /* 1: grey; 3: red, green, blue */
@@ -76,7 +76,7 @@ typedef struct CrtTexelsInfo {
 typedef struct CrtImageModule {
     uint32_t struct_size;
     uint32_t reserved;
-    /* What is behind it, e.g. "OpenImageIO 2.4.7". */
+    /* The library behind it, e.g. "OpenImageIO 2.4.7". */
     const char *build;
     /* Every float channel as float, every integer channel as uint32, zip compressed. The file name need not
      * end in .exr. */

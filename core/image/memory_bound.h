@@ -1,4 +1,4 @@
-/// How much memory the pixels of an image may take. In a header, for crt and its image module.
+/// Limits the memory that the pixels of an image may take. In a header, for crt and its image module.
 #pragma once
 
 #include <fmt/format.h>
@@ -8,8 +8,8 @@
 
 namespace crt {
 
-/// Why an image's pixels, of `bytes_a_pixel` each, are too large for `most_bytes`, which is half of the
-/// memory that is free; empty when they are not.
+/// Reason why an image's pixels, of `bytes_a_pixel` each, are too large for `most_bytes`, which is half of
+/// the free memory; empty if they are not.
 inline std::string refusalForMemory(std::uint64_t width, std::uint64_t height, std::uint64_t bytes_a_pixel,
                                     std::uint64_t most_bytes) {
     constexpr double kGigabyte = 1e9;

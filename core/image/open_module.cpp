@@ -64,7 +64,7 @@ void prepareToWrite(OutputFormat format) noexcept {
     try {
         imageModule("", ErrorKind::Output);
     } catch (...) {
-        // Whoever writes asks again.
+        // A writer tries again.
     }
 }
 

@@ -15,7 +15,7 @@ namespace crt {
 const CrtImageModule& imageModule(const std::string& path, ErrorKind kind);
 
 /// Opens it beforehand, where writing such a file needs it: its hundreds of libraries take a fifth of a
-/// second. What goes wrong is told when the file is written. [any thread]
+/// second. Errors are reported when the file is written. [any thread]
 void prepareToWrite(OutputFormat format) noexcept;
 
 }  // namespace crt

@@ -38,7 +38,7 @@ struct FileBytes {
     std::unique_ptr<unsigned char[]> data;
 };
 
-/// What IHDR says of a file that is read here.
+/// The IHDR of a file that is read here.
 struct Kind {
     std::uint32_t width = 0, height = 0;
     std::size_t samples = 0;       ///< A pixel, alpha among them.

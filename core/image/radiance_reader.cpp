@@ -77,8 +77,7 @@ std::string_view takeWord(std::string_view& text) {
     return word;
 }
 
-/// How the pixels follow each other: along one axis within a row of the file, along the other from row to
-/// row.
+/// The order of the pixels: along one axis within a row of the file, along the other from row to row.
 struct Order {
     bool rows_are_columns = false;                 ///< X comes first: a row of the file is a column.
     bool from_bottom = false, from_right = false;  ///< +Y and -X.

@@ -40,7 +40,7 @@ void requireFile(const std::string& path) {
     }
 }
 
-/// Which crt reads itself.
+/// Formats that crt reads itself.
 bool isPfm(const std::string& path) {
     std::ifstream file(path, std::ios::binary);
     char mark[2] = {};
@@ -142,7 +142,7 @@ private:
     int descriptor_;
 };
 
-/// What `read` makes of the image's path. Messages name the image.
+/// The result of `read` for the image's path. Messages name the image.
 template <class Read>
 auto readSource(const ImageSource& source, const Read& read) {
     if (!source.bytes) return read(source.name);

@@ -36,9 +36,9 @@ struct Texels {
     std::vector<unsigned char> bytes;
 };
 
-/// What the header of a PNG, JPEG, TGA, EXR, Radiance HDR or PFM says. Throws crt::Error(Scene), "cannot
-/// read the image 'x.png': …", for a file that is missing, of another format, larger than kMostTexels,
-/// whose pixels cannot lie in a file of its size, or take more than half of the memory that is free.
+/// The header of a PNG, JPEG, TGA, EXR, Radiance HDR or PFM. Throws crt::Error(Scene), "cannot read the
+/// image 'x.png': …", for a file that is missing, of another format, larger than kMostTexels, whose pixels
+/// cannot lie in a file of its size, or take more than half of the memory that is free.
 TexelsInfo texelsInfo(const std::string& path);
 
 /// The pixels too. Throws crt::Error(Scene) also for one that is truncated or damaged.
@@ -51,7 +51,7 @@ Texels readAlpha(const std::string& path);
 /// without a surface.
 void divideByAlpha(Texels& colors, const Texels& alpha);
 
-/// An image in a file of its own, or as bytes in a file of another kind.
+/// An image in a separate file, or as bytes in a file of another kind.
 struct ImageSource {
     std::string name;                            ///< For messages: the path, or "a.glb (image 2)".
     std::shared_ptr<const std::string> bytes{};  ///< Null: `name` is the path of a file.
@@ -60,7 +60,7 @@ TexelsInfo texelsInfo(const ImageSource& source);
 Texels readTexels(const ImageSource& source);
 Texels readAlpha(const ImageSource& source);
 
-/// How the numbers of a file are meant.
+/// Encoding of the numbers of a file.
 enum class TexelColor {
     Auto,    ///< sRGB for 8 and 16 bits, linear for floats.
     Srgb,    ///< Encoded by IEC 61966-2-1.

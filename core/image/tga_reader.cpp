@@ -81,7 +81,7 @@ Pixel colorOf(const unsigned char* bytes, unsigned depth) {
     return {wide(10), wide(5), wide(0), static_cast<unsigned char>(bits >> 15 != 0 ? 255 : 0)};
 }
 
-/// What field 24 of a file with an extension area says of alpha; 3, "useful", where there is none.
+/// The type of alpha in field 24 of a file with an extension area; 3, "useful", without one.
 unsigned alphaMeaning(const File& file, std::uint64_t file_bytes) {
     constexpr unsigned kUseful = 3;
     std::array<unsigned char, kFooterBytes> footer;

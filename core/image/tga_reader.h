@@ -9,11 +9,11 @@
 
 namespace crt::image {
 
-/// Whether the file begins as a TGA does. The format has no signature: its kind, depth and colour map must
+/// True if the file begins as a TGA does. The format has no signature: its kind, depth and colour map must
 /// agree. Ask after all formats that have one.
 bool beginsAsTga(const char* path);
 
-/// What to take of the pixels.
+/// The pixels to read.
 enum class TgaPart { Color, Alpha };
 
 /// Fills in *info, and with a buffer of `buffer_bytes` the pixels, too. Returns why not; empty when all is

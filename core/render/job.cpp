@@ -186,9 +186,9 @@ void tellTarget(const RunFacts& facts) {
         return error ? percentText(error->half_width_95) : std::string("none");
     };
     if (facts.stop == StopReason::Target)
-        logInfo(
-            "target error {:.3g} % reached: 95 % half-width {}, even pixels {}, odd pixels {}",
-            target * 100, half_width(facts.error), half_width(facts.deciding), half_width(facts.judging));
+        logInfo("target error {:.3g} % reached: 95 % half-width {}, even pixels {}, odd pixels {}",
+                target * 100, half_width(facts.error), half_width(facts.even_pixels),
+                half_width(facts.odd_pixels));
     else if (!facts.error->known() && facts.error->rare_paths > 0)
         logInfo("the error is not yet known: surfaces mirror a light or scatter it into a narrow lobe, "
                 "single paths may carry {:.2g} times the mean luminance, and too few of them were sampled",

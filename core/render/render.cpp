@@ -264,8 +264,8 @@ void judgeError(Rendered& run) {
     try {
         run.facts.error = estimate(PixelSet::All);
         if (run.facts.target_error > 0) {
-            run.facts.deciding = estimate(PixelSet::Even);
-            run.facts.judging = estimate(PixelSet::Odd);
+            run.facts.even_pixels = estimate(PixelSet::Even);
+            run.facts.odd_pixels = estimate(PixelSet::Odd);
         }
     } catch (const std::bad_alloc&) {  // The film matters more than its error.
         logWarning("out of memory on the host: the error of the image is unknown");

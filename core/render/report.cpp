@@ -80,8 +80,8 @@ Json errorJson(const RunFacts& facts) {
              {knownOrNull((needed.lower - samples) * each), knownOrNull((needed.upper - samples) * each)}}};
     }
     if (facts.target_error > 0)
-        json["judged"] = {{"even_pixels", estimateJson(facts.deciding)},
-                          {"odd_pixels", estimateJson(facts.judging)}};
+        json["judged"] = {{"even_pixels", estimateJson(facts.even_pixels)},
+                          {"odd_pixels", estimateJson(facts.odd_pixels)}};
     return json;
 }
 

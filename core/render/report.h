@@ -39,8 +39,8 @@ struct RunFacts {
     std::uint64_t film_bands = 1;       ///< In which the film was rendered; 1: as a whole.
     std::uint64_t invalid_samples = 0;
     std::optional<ErrorEstimate> error; ///< Of the film, by all replicates; nothing while unknown.
-    std::optional<ErrorEstimate> deciding,
-        judging;  ///< With a target error: by even and by odd pixels, which must both reach it.
+    std::optional<ErrorEstimate> even_pixels,
+        odd_pixels;  ///< With a target error: both must reach it.
     double target_error = 0;            ///< 0: none.
 
     StopReason stop = StopReason::Samples;

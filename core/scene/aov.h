@@ -20,12 +20,12 @@ enum Aov : std::uint32_t {
 #undef CRT_AOV_VALUE
 };
 
-/// Which code of the kernel or of the film makes the values of an AOV.
+/// The code, of the kernel or of the film, that makes the values of an AOV.
 enum class AovSource { FirstHit, Samples, Ids, Film };
 
 struct AovRow {
     Aov aov;
-    std::uint32_t width;  ///< Film channels of its own.
+    std::uint32_t width;  ///< Separate film channels.
     AovSource source;
     bool integer;                ///< Its image channels are 32-bit integers; otherwise floats.
     std::string_view name;       ///< In scene files; empty when it is no output.
@@ -64,7 +64,7 @@ constexpr std::uint32_t aovsWhere(Predicate belongs) {
     return mask;
 }
 
-/// What the kernel finds at the first hit.
+/// The data of the kernel's first hit.
 inline constexpr std::uint32_t kAovsOfFirstHits = aovsWhere(
     [](const AovRow& row) { return row.source == AovSource::FirstHit || row.source == AovSource::Ids; });
 
@@ -87,7 +87,7 @@ constexpr std::uint32_t channelsFor(std::uint32_t aovs, std::uint32_t replicates
     return channels;
 }
 
-/// What a scene file may write under `aovs`, in the order of the rows.
+/// The names that a scene file may use under `aovs`, in the order of the rows.
 inline std::vector<std::string> aovNames() {
     std::vector<std::string> names;
     for (const AovRow& row : kAovRows)

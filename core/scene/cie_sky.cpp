@@ -36,7 +36,7 @@ double gradation(const Parameters& p, double cosine) {
     return cosine > 0 ? 1 + p.a * std::exp(p.b / cosine) : 1;
 }
 
-/// How the sky scatters at an angle with the sun.
+/// Scattering of the sky at an angle with the sun.
 double indicatrix(const Parameters& p, double angle) {
     const double cosine = std::cos(angle);
     return 1 + p.c * (std::exp(p.d * angle) - std::exp(p.d * std::numbers::pi / 2)) + p.e * cosine * cosine;

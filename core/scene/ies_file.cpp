@@ -44,7 +44,7 @@ public:
         const std::string_view word = nextWord();
         if (word.empty()) fail(fmt::format("the file ends where {} should stand", what));
         double value = 0;
-        const std::size_t sign = word.front() == '+' ? 1 : 0;  // Which from_chars does not know.
+        const std::size_t sign = word.front() == '+' ? 1 : 0;  // A sign that from_chars does not accept.
         const auto [end, problem] = std::from_chars(word.data() + sign, word.data() + word.size(), value);
         if (problem != std::errc() || end != word.data() + word.size() || !std::isfinite(value))
             fail(fmt::format("expected {}, a number, found '{}'", what, shown(word)));
@@ -135,10 +135,10 @@ void checkVertical(const IesText& text, int line, const std::vector<double>& ang
 /// The columns of a file, by their horizontal angles.
 struct Columns {
     std::vector<double> angles;
-    std::vector<std::size_t> of;  ///< Which column of the file each is.
+    std::vector<std::size_t> of;  ///< The column of the file for each of them.
 };
 
-/// What the file leaves out because it is symmetric.
+/// Values that the file leaves out because it is symmetric.
 Columns allRound(const IesText& text, int line, const std::vector<double>& angles) {
     requireIncreasing(text, line, angles, "horizontal");
     const double first = angles.front(), last = angles.back();

@@ -1,5 +1,5 @@
-/// What a scene may count lengths in. Lengths stay as the scene has them; light that spreads over square
-/// metres is what depends on it.
+/// Length units of a scene. Lengths stay as the scene has them; light that spreads over square metres is
+/// what depends on it.
 #pragma once
 
 #include <string>

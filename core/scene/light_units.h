@@ -1,4 +1,4 @@
-/// What lamps are bought by, in terms of spectra: lumens, candelas and lux, and the solid angles of lights.
+/// Converts lumens, candelas and lux to spectra, and computes the solid angles of lights.
 #pragma once
 
 #include "spectra/spectra.h"

@@ -88,7 +88,7 @@ std::vector<const PointLight*> lightsWithoutSize(const Scene& scene) {
 
 std::vector<std::string> missingLight(const Scene& scene) {
     std::vector<std::string> missing;
-    // With a depth of 0 the scene asks for no light on anything.
+    // With a depth of 0 the scene shows no illuminated surfaces.
     if (scene.integrator.type != IntegratorType::Path || scene.integrator.max_depth == 0) return missing;
     const SingleDirections found = singleDirectionsOf(scene);
     if (const std::vector<const PointLight*> lights = lightsWithoutSize(scene); !lights.empty()) {

@@ -12,9 +12,9 @@ namespace crt {
 /// Lights that scattered rays never meet: they have no size. Suns have one. None that is black.
 std::vector<const PointLight*> lightsWithoutSize(const Scene& scene);
 
-/// What is missing, each a part of a sentence: "light of point and spot lights that smooth glass refracts or
-/// reflects". Empty: nothing that follows from the kinds of lights and surfaces and from the settings.
-/// Whether light takes such a way at all depends on the geometry, which nobody asks.
+/// The missing light, each a part of a sentence: "light of point and spot lights that smooth glass refracts
+/// or reflects". Empty: nothing that follows from the kinds of lights and surfaces and from the settings. It
+/// depends on the geometry, which is not examined, whether light takes such a path at all.
 std::vector<std::string> missingLight(const Scene& scene);
 
 /// "the image lacks …; …", and what to do. One sentence, for what missingLight(scene) says, not empty.

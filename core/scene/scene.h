@@ -109,18 +109,19 @@ inline constexpr std::pair<MaterialType, const char*> kMaterialNames[] = {
 };
 inline constexpr std::pair<MaterialType, const char*> kComposedNames[] = {
     {MaterialType::Mix, "mix"}, {MaterialType::TwoSided, "two_sided"}};
-/// How deep mixes and two-sided materials may be made of one another.
+/// Largest depth of nesting of mixes and two-sided materials.
 inline constexpr int kDeepestComposition = 8;
-/// How deep the mixes are that an openpbr material becomes.
+/// Largest depth of the mixes that an openpbr material becomes.
 inline constexpr int kDeepestOpenPbr = 3;
 
 /// The coat of OpenPBR Surface 1.1 (kernel/materials/clearcoat.h), on what reflects alone.
 struct Clearcoat {
     double ior = 1.6;       ///< At least 1.
     double roughness = 0;   ///< In [0,1].
-    Spectrum depth;         ///< What is left of light that crosses it straight on is exp(−depth).
-    double darkening = 1;   ///< How much of what it sends back to the base, and the base absorbs, is lost.
-    /// How rough what lies below is, as the darkening sees it. In [0,1]; of a material with a textured
+    Spectrum depth;         ///< The transmittance at normal incidence is exp(−depth).
+    double darkening = 1;   ///< Fraction of the light sent back to the base, and absorbed by the base, that
+                            ///< is lost.
+    /// Effective roughness of the layers below, for the darkening. In [0,1]; of a material with a textured
     /// roughness that is in its place.
     double base_roughness = 1;
 };
@@ -174,7 +175,7 @@ struct Material {
         return {reflectance_texture, roughness_texture, film_texture,
                 opacity_texture,     amount_texture,    normal_texture};
     }
-    /// Whether light comes out on the other side.
+    /// True if light comes out on the other side.
     bool transmits() const {
         return type == MaterialType::Dielectric || type == MaterialType::RoughDielectric ||
                type == MaterialType::ThinDielectric;
@@ -220,13 +221,13 @@ struct Quadric {
 
 /// "a sphere"
 const char* wordOf(QuadricType type);
-/// What a transform multiplies lengths by; nothing where it does so in one direction more than in another.
+/// The factor by which a transform scales lengths; nothing if the scale depends on the direction.
 std::optional<double> evenScaleOf(const Matrix4d& transform);
 /// Of one that does: what is wrong with that, behind wordOf.
 inline constexpr const char* kShapesStayShapes =
     "is scaled by the same factor in every direction: a transform must not stretch or shear it";
 
-/// Whether the places of an object have one copy of its mesh in common.
+/// True if the places of an object share one copy of its mesh.
 enum class Sharing { Auto, Always, Never };
 
 /// A mesh or a shape, placed once per transform.
@@ -237,9 +238,9 @@ struct Object {
     std::optional<Quadric> shape{};              ///< In place of the mesh, which is an empty one then.
     std::vector<Matrix4d> transforms{kIdentity4d};
     std::int32_t material =
-        -1;  ///< Index into Scene::materials; used where the mesh has no material of its own.
+        -1;  ///< Index into Scene::materials; used where the mesh itself has no material.
     std::int32_t emission =
-        -1;  ///< Index into Scene::emissions, −1 none; used where the mesh has none of its own.
+        -1;  ///< Index into Scene::emissions, −1 none; used where the mesh itself has none.
     SourcePlace place;
 };
 
@@ -276,7 +277,7 @@ struct PointLight {
     SourcePlace place;
 };
 
-/// Of what is far away: perpendicular unit vectors.
+/// Frame of a distant light: perpendicular unit vectors.
 struct Axes {
     Vec3d right{1, 0, 0}, up{0, 1, 0}, ahead{0, 0, -1};
 };
@@ -293,7 +294,7 @@ struct EnvironmentImage {
 struct CieSky {
     int type = 12;            ///< 1 to 15.
     Vec3d towards_sun{0, 1, 0};  ///< Unit.
-    bool horizontal = false;  ///< What `amount` is.
+    bool horizontal = false;  ///< Meaning of `amount`.
     double amount = 1;  ///< Radiance of the zenith or irradiance of the ground, per unit of the spectrum.
     Axes axes;                ///< The zenith is `up`.
     int rows = 256;           ///< Of the image that it becomes, twice as wide.
@@ -368,7 +369,7 @@ inline std::int32_t emissionIndexOf(const Scene& scene, const Object& object, st
     return emissionIndexOf(scene, object, scene.meshes[object.mesh], triangle);
 }
 
-/// How many independent sequences the samples of a pixel are of (layout.h: CRT_REPLICATES_MAX); 1: the film
+/// Number of independent sequences of the samples of a pixel (layout.h: CRT_REPLICATES_MAX); 1: the film
 /// keeps no sums of replicates. By default as few as give the image's error a thousand degrees of freedom,
 /// since the pixels of a film add theirs up and every further sequence costs noise. By the whole film, so
 /// that the crop window of an image has its bits.

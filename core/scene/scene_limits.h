@@ -1,5 +1,5 @@
-/// What a scene may ask for, where the file itself is fine: radiance that single precision carries, and
-/// memory in proportion to the files.
+/// Limits of a scene whose file is valid: radiance within single precision, and memory in proportion to the
+/// files.
 #pragma once
 
 #include "scene/scene.h"
@@ -21,8 +21,8 @@ inline constexpr double kLeastRadiance = 1e-25;
 /// that is too dim beside others to shine at all.
 void checkRadiance(const Scene& scene);
 
-/// How much memory a scene may take that its files do not show: placements, aliases and polygons written
-/// out. 1.5 GB, and 50 bytes for each byte of its files, so that a large model is never refused for its size
+/// Limit of the memory that a scene takes beyond its files: placements, aliases and polygons written out.
+/// 1.5 GB, and 50 bytes for each byte of its files, so that a large model is never refused for its size
 /// alone; or what the environment variable CRT_SCENE_MEMORY says ("20GB").
 class ExpansionLimit {
 public:
@@ -30,15 +30,15 @@ public:
     explicit ExpansionLimit(std::uint64_t input_bytes);
 
     std::uint64_t bytes() const { return bytes_; }
-    /// Why `count` of `things` are too many, with what they would take and how to allow it; empty when they
-    /// are not.
+    /// Reason why `count` of `things` are too many, with the memory that they need and the way to allow it;
+    /// empty if they are not.
     std::string refusal(std::uint64_t count, const std::string& things, std::uint64_t bytes_each) const;
 
 private:
     std::uint64_t bytes_;
 };
 
-/// What one takes at the peak, from reading to rendering: measured with a million (docs/decisions/0014).
+/// Peak memory of one, from reading to rendering: measured with a million (docs/decisions/0014).
 inline constexpr std::uint64_t kBytesPerTriangle = 500;
 inline constexpr std::uint64_t kBytesPerPlacement = 250;
 /// Values of YAML behind an alias cost time, not memory: 16 million at 1.5 GB are some seconds.

@@ -27,7 +27,7 @@ struct SolarCoordinates {
 };
 SolarCoordinates solarCoordinates(const Moment& when);
 
-/// Whether there is such a day.
+/// True if this day exists.
 bool isDate(int year, int month, int day);
 
 }  // namespace crt

@@ -1,5 +1,5 @@
-/// What a film keeps of the spectrum beside X, Y and Z: bins of wavelengths, as a spectroradiometer has, and
-/// the responses of sensors.
+/// The spectral data of a film besides X, Y and Z: bins of wavelengths, as a spectroradiometer has, and the
+/// responses of sensors.
 #pragma once
 
 #include "spectra/spectra.h"
@@ -35,7 +35,7 @@ struct SensorResponse {
     Spectrum spectrum;  ///< At least 0, and not 0 everywhere.
 };
 
-/// As a scene asks for it.
+/// As the scene specifies it.
 struct SpectralFilm {
     SpectralBins bins;
     std::vector<SensorResponse> responses;

@@ -18,7 +18,7 @@ namespace crt {
 using TextureIndex = std::int32_t;
 inline constexpr TextureIndex kNoTexture = -1;
 
-/// What the texels of an image are.
+/// Encoding of the texels of an image.
 enum class TexelKind {
     Spectra,  ///< Reflectances: three words, the coefficients of a sigmoid (kernel/values/texture.h).
     Numbers,  ///< In [0, 1]: one word, of 65535.
@@ -26,8 +26,8 @@ enum class TexelKind {
 };
 constexpr std::size_t wordsOf(TexelKind kind) { return kind == TexelKind::Numbers ? 1 : 3; }
 
-/// An image file, open for whoever needs its texels. They may be gigabytes: nobody holds them but the
-/// compiled scene, into which they are decoded.
+/// An image file whose texels are decoded on demand. They may be gigabytes: only the compiled scene holds
+/// them, into which they are decoded directly.
 struct TextureImage {
     std::string file;
     std::uint32_t width = 0, height = 0;
@@ -42,7 +42,7 @@ struct TextureImage {
 enum class TextureFilter { Bilinear, Nearest };
 enum class TextureWrap { Repeat, Mirror, Clamp };
 
-/// A value of its own, or another texture.
+/// A single value, or another texture.
 struct TextureValue {
     Spectrum spectrum;
     TextureIndex texture = kNoTexture;

@@ -40,7 +40,7 @@ std::vector<std::string> partsOf(std::string_view name) {
     return {};
 }
 
-// ---- What is built in
+// ---- Built-in data
 
 NamedData illuminant(const data::Illuminant& lamp) {
     NamedData row{.name = fmt::format("illuminants/{}", lamp.name),
@@ -113,7 +113,7 @@ std::vector<std::string> builtInNames() {
     return names;
 }
 
-// ---- What lies in files
+// ---- Data in files
 
 /// Of the first folder that has it; empty when none has.
 std::string fileOf(const std::string& family, const std::string& name) {

@@ -24,7 +24,7 @@ struct NamedData {
     std::string quantity{};  ///< "reflectance", "radiance", "refractive index".
     std::string source{};
     std::string outside{};   ///< Beyond the table: "clamp", "zero"; "formula" where nothing is beyond.
-    std::string formula{};   ///< Of which the table is a sampling; empty: the table is what was published.
+    std::string formula{};   ///< The formula that the table samples; empty: the table is the published data.
     std::string file{};      ///< Empty: built in.
     std::vector<double> wavelength_nm{};
     std::vector<std::string> columns{};
@@ -46,7 +46,7 @@ struct NamedSpectrum {
     std::string file;  ///< Empty: built in.
 };
 
-/// What `data: name` means; nothing when there is no spectrum of that name. Throws as findData().
+/// The spectrum of `data: name`; nothing if there is none of that name. Throws as findData().
 std::optional<NamedSpectrum> dataSpectrum(std::string_view name);
 
 }  // namespace crt

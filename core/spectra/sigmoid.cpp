@@ -17,7 +17,7 @@ double sigmoidSlope(double x) {
     return 0.5 / (h2 * std::sqrt(h2));
 }
 
-/// Where the sigmoid is `y`.
+/// The place where the sigmoid is `y`.
 double inverseSigmoid(double y) { return (y - 0.5) / std::sqrt(y * (1.0 - y)); }
 
 struct Residual {

@@ -17,9 +17,9 @@ using SigmoidCoefficients = std::array<float, 3>;
 
 /// Coefficients of a linear sRGB colour in [0, 1]. The colour that the reflectance shows under D65 is within
 /// 10⁻⁴ of it in each component on average, and 3·10⁻³ at worst, next to white
-/// (tests/unit_sigmoid.cpp); greys are exact. Black and white are 10⁻⁷ off 0 and 1. What lies outside
-/// [0, 1] counts as the nearer end; NaN as 0. The first call makes a table of 2.7 MB, by threads, in a
-/// fraction of a second. [any thread]
+/// (tests/unit_sigmoid.cpp); greys are exact. Black and white are 10⁻⁷ off 0 and 1. Values outside [0,
+/// 1] count as the nearer end; NaN as 0. The first call makes a table of 2.7 MB, by threads, in a fraction
+/// of a second. [any thread]
 SigmoidCoefficients sigmoidCoefficients(const std::array<float, 3>& linear_srgb);
 
 /// The table behind sigmoidCoefficients(), for callers with millions of colours.
@@ -28,7 +28,7 @@ public:
     /// Made by the first call.
     static const SigmoidTable& get();
 
-    /// What depends on the largest component of a colour alone; images have few of them.
+    /// The part that depends only on the largest component of a colour; images have few of them.
     struct Level {
         float value, inverse, position;
     };
@@ -55,10 +55,10 @@ struct SigmoidNode {
     Vec3d weight;
 };
 
-/// t of so many nanometres above 360.
+/// t of a wavelength that is this number of nanometres above 360.
 double sigmoidWavelength(double nanometres);
 
-/// How much each wavelength of a reflectance under D65 adds to linear sRGB. Each channel sums to exactly
+/// Contribution of each wavelength of a reflectance under D65 to linear sRGB. Each channel sums to exactly
 /// what white gives, 1, also where the tabulated D65 and the rounded white point of sRGB differ in the
 /// fourth digit; so greys are constants and colours close to grey are close to constants.
 const std::array<Spectrum, 3>& rgbWeights();

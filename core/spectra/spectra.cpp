@@ -66,8 +66,8 @@ CellShares momentsOf(const std::vector<Knot>& knots, double lower, double first_
     return shares;
 }
 
-/// Whether the table falls to zero at the whole nanometre `nm`, which is then the end of a step and not of a
-/// line. Nothing is told of wavelengths beyond the grid, so its own ends are none.
+/// True if the table falls to zero at the whole nanometre `nm`, which is then the end of a step and not of a
+/// line. The ends of the grid are not treated as ends of a table.
 bool stepsAt(double nm, const std::vector<double>& x, const std::vector<double>& y, Outside outside) {
     if (outside != Outside::Zero || nm == kWavelengthMin_nm || nm == kWavelengthMax_nm) return false;
     return (nm == x.front() && y.front() != 0) || (nm == x.back() && y.back() != 0);
@@ -257,7 +257,7 @@ SampledSpectrum readSpectrumTable(const std::string& path) {
 
 Spectrum readSpectrumFile(const std::string& path, Outside outside) {
     const auto [wavelength, value] = readSpectrumTable(path);
-    // What is left to find concerns the table as a whole; the message gains the file it is about.
+    // The remaining errors concern the table as a whole; the message gains the name of the file.
     try {
         return tableSpectrum(wavelength, value, outside);
     } catch (const Error& e) {

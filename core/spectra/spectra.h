@@ -83,7 +83,7 @@ struct Spectrum {
     bool operator==(const Spectrum& other) const = default;
 };
 
-/// What a table does beyond its first and last wavelength.
+/// Behaviour of a table beyond its first and last wavelength.
 enum class Outside { Clamp, Zero, Error };
 
 Spectrum constantSpectrum(double value);

@@ -194,7 +194,7 @@ constexpr std::array<double, kObserverSize> kCieZ = {
 };
 
 // CIE illuminants, relative spectral power in steps of 5 nm, to the six digits published. A table some
-// renderers carry as D50 (49.664 at 400 nm) is another daylight: its white is x = .337, not .3457.
+// renderers carry as D50 (49.664 at 400 nm) is a different daylight: its white is x = .337, not .3457.
 constexpr std::string_view kIlluminantSource =
     "CIE 015:2018, Colorimetry: tables of illuminants A, D65 "
     "and D50 and of the fluorescent lamps FL2, FL7 and FL11";

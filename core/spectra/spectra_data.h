@@ -39,7 +39,7 @@ inline constexpr double kMetalFirst_eV =
     4.15;  ///< Photon energy of the first sample; the rest follow downwards.
 inline constexpr double kMetalStep_eV = 0.05;
 
-/// Where the sample `i` of a metal lies.
+/// Wavelength of the sample `i` of a metal.
 constexpr double metalWavelength_nm(std::size_t i) {
     constexpr double kElectronVoltNanometre = 1239.841984;  // h c / e, CODATA 2018.
     return kElectronVoltNanometre / (kMetalFirst_eV - kMetalStep_eV * static_cast<double>(i));

@@ -12,7 +12,7 @@ struct SampledSpectrum {
     std::vector<double> value;
 };
 
-/// What readSpectrumFile() (spectra.h) reads. Throws crt::Error(Scene) with file and line.
+/// The result of readSpectrumFile() (spectra.h). Throws crt::Error(Scene) with file and line.
 SampledSpectrum readSpectrumTable(const std::string& path);
 
 }  // namespace crt

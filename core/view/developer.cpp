@@ -12,8 +12,8 @@
 
 namespace crt {
 
-Developer::Developer(Board& board, unsigned threads)
-    : board_(board), thread_([this, threads, listener = currentListener()] {
+Developer::Developer(ViewState& state, unsigned threads)
+    : state_(state), thread_([this, threads, listener = currentListener()] {
           const ListenerScope scope(listener);
           runWithThreads(threads, [this] { run(); });
       }) {}
@@ -74,9 +74,9 @@ void Developer::run() {
 
 void Developer::develop(const Snapshot& snapshot, const Display& display) {
     if (aovsLacking(*snapshot.film, display.plane) != 0) return;  // A film that has the plane is on its way.
-    board_.show(pictureOf(snapshot, display));
+    state_.show(pictureOf(snapshot, display));
     if (std::exchange(run_, snapshot.run) != snapshot.run) {
-        board_.update([](Status& status) { status.errors.clear(); });
+        state_.update([](Status& status) { status.errors.clear(); });
         estimated_.reset();
     }
     if (snapshot.divisor == 1) estimate(snapshot);
@@ -101,7 +101,7 @@ void Developer::estimate(const Snapshot& snapshot) {
                            .error = error->relative_rmse,
                            .lower = error->relative_rmse_95.lower,
                            .upper = error->relative_rmse_95.upper};
-    board_.update([&](Status& status) {
+    state_.update([&](Status& status) {
         // The same film shown in other colours has no new error.
         if (!status.errors.empty() && status.errors.back().samples == point.samples) return;
         status.errors.push_back(point);

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "base/stopwatch.h"
-#include "view/board.h"
+#include "view/view_state.h"
 #include "view/planes.h"
 #include "view/snapshot.h"
 
@@ -17,7 +17,7 @@ namespace crt {
 class Developer {
 public:
     /// Takes at most `threads` threads, 0: one a processor.
-    Developer(Board& board, unsigned threads);
+    Developer(ViewState& state, unsigned threads);
     ~Developer();
     Developer(const Developer&) = delete;
     Developer& operator=(const Developer&) = delete;
@@ -35,7 +35,7 @@ private:
     void develop(const Snapshot& snapshot, const Display& display);
     void estimate(const Snapshot& snapshot);
 
-    Board& board_;
+    ViewState& state_;
     mutable std::mutex mutex_;
     std::condition_variable changed_;
     std::optional<Snapshot> newest_;

@@ -141,9 +141,9 @@ std::vector<RequestedChange> readChanges(const std::string& text) {
     return changes;
 }
 
-std::string sightJson(const Board::Sight& sight) {
-    const Status& s = sight.status;
-    Json json{{"version", sight.version},
+std::string stateJson(const ViewState::Copy& copy) {
+    const Status& s = copy.status;
+    Json json{{"version", copy.version},
               {"program", s.program},
               {"file", s.file},
               {"title", s.title},
@@ -170,7 +170,7 @@ std::string sightJson(const Board::Sight& sight) {
               {"plane", s.plane},
               {"errors", errorsJson(s.errors)},
               {"tev", s.tev}};
-    if (const Picture* const p = sight.picture.get())
+    if (const Picture* const p = copy.picture.get())
         json["picture"] = {{"number", p->number},   {"width", p->width},
                            {"height", p->height},   {"samples", p->samples},
                            {"divisor", p->divisor}, {"plane", p->plane},

@@ -1,7 +1,7 @@
 /// Messages between pages and the program, as JSON.
 #pragma once
 
-#include "view/board.h"
+#include "view/view_state.h"
 
 #include <array>
 #include <cstdint>
@@ -40,7 +40,7 @@ struct RequestedChange {
 std::vector<RequestedChange> readChanges(const std::string& text);
 
 /// All of the status, and the picture's numbers without its pixels.
-std::string sightJson(const Board::Sight& sight);
+std::string stateJson(const ViewState::Copy& copy);
 
 /// The moved keys of a scene's camera, as the scene file has them; the angle only with `has_fov`.
 std::string cameraYaml(const CameraPose& pose, bool has_lens, bool has_fov);

@@ -51,11 +51,11 @@ HttpReply wholePage() {
 }
 
 /// The length of a JSON text, the text, and behind it the picture's pixels unless the page has them.
-HttpReply sight(Viewer& viewer, const HttpRequest& request) {
+HttpReply state(Viewer& viewer, const HttpRequest& request) {
     constexpr std::chrono::seconds kLongestWait{15};
-    const Board::Sight now = viewer.board().waitBeyond(numberIn(request, "after"), kLongestWait);
+    const ViewState::Copy now = viewer.state().waitBeyond(numberIn(request, "after"), kLongestWait);
     if (now.closed) return {.status = 503, .body = "crt view ends"};
-    const std::string json = sightJson(now);
+    const std::string json = stateJson(now);
     const bool send = now.picture && now.picture->number != numberIn(request, "picture");
     static_assert(std::endian::native == std::endian::little, "the page reads a little-endian length");
     const auto length = static_cast<std::uint32_t>(json.size());
@@ -84,7 +84,7 @@ HttpReply change(Viewer& viewer, const HttpRequest& request) {
     }
     viewer.change(wanted);
     return {.type = "application/json",
-            .body = fmt::format("{{\"version\": {}}}", viewer.board().now().version)};
+            .body = fmt::format("{{\"version\": {}}}", viewer.state().now().version)};
 }
 
 }  // namespace
@@ -93,7 +93,7 @@ HttpReply answerPage(Viewer& viewer, const HttpRequest& request) {
     constexpr const char* kJson = "application/json";
     const std::string what = request.method + " " + request.path;
     if (what == "GET /") return wholePage();
-    if (what == "GET /sight") return sight(viewer, request);
+    if (what == "GET /state") return state(viewer, request);
     if (what == "POST /change") return change(viewer, request);
     if (what == "GET /pixel") {
         const auto at = [&](const char* key) {

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "image/development.h"
-#include "view/board.h"
+#include "view/view_state.h"
 #include "view/snapshot.h"
 
 #include <optional>

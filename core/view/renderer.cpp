@@ -16,9 +16,9 @@
 namespace crt {
 namespace {
 
-/// Camera and film of the scene that is wished for, in pixels `divisor` times as large: what changeView()
+/// Camera and film of the scene that is requested, in pixels `divisor` times as large: what changeView()
 /// takes.
-Scene viewOf(const RenderWishes& wanted, unsigned divisor) {
+Scene viewOf(const RenderRequest& wanted, unsigned divisor) {
     const Scene& scene = *wanted.scene;
     Scene view;
     view.camera = withPose(scene.camera, wanted.pose);
@@ -34,29 +34,29 @@ Scene viewOf(const RenderWishes& wanted, unsigned divisor) {
 
 }  // namespace
 
-bool RenderWishes::sameDevice(const RenderWishes& other) const {
+bool RenderRequest::sameDevice(const RenderRequest& other) const {
     return backend == other.backend && integrator.device == other.integrator.device;
 }
 
-bool RenderWishes::samePicture(const RenderWishes& other) const {
+bool RenderRequest::samePicture(const RenderRequest& other) const {
     return sameDevice(other) && scene == other.scene && aovs == other.aovs && pose == other.pose;
 }
 
-Renderer::Renderer(RenderWishes wishes, Board& board, std::function<void(Snapshot)> hand_on)
-    : board_(board),
+Renderer::Renderer(RenderRequest request, ViewState& state, std::function<void(Snapshot)> hand_on)
+    : state_(state),
       hand_on_(std::move(hand_on)),
-      wishes_(std::move(wishes)),
-      thread_([this, threads = wishes_.integrator.threads, listener = currentListener()] {
+      request_(std::move(request)),
+      thread_([this, threads = request_.integrator.threads, listener = currentListener()] {
           const ListenerScope scope(listener);
           runWithThreads(threads, [this] { run(); });
       }) {}
 
 Renderer::~Renderer() { stop(); }
 
-void Renderer::wish(const std::function<void(RenderWishes&)>& change) {
+void Renderer::request(const std::function<void(RenderRequest&)>& change) {
     {
         const std::lock_guard lock(mutex_);
-        change(wishes_);
+        change(request_);
         ++revision_;
     }
     changed_.notify_all();
@@ -71,21 +71,21 @@ void Renderer::stop() {
 }
 
 bool Renderer::hasWork() const {
-    if (!wishes_.scene || failed_ == revision_.load()) return false;
-    if (!applied_ || !applied_->samePicture(wishes_)) return true;
-    return !wishes_.paused && (divisor_ > 1 || samples_ < wishes_.samplesWanted());
+    if (!request_.scene || failed_ == revision_.load()) return false;
+    if (!applied_ || !applied_->samePicture(request_)) return true;
+    return !request_.paused && (divisor_ > 1 || samples_ < request_.samplesWanted());
 }
 
-bool Renderer::waitForWork(RenderWishes& wanted) {
+bool Renderer::waitForWork(RenderRequest& wanted) {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [&] { return stopping_ || hasWork(); });
-    wanted = wishes_;
+    wanted = request_;
     taken_ = revision_;
     return !stopping_;
 }
 
 void Renderer::run() {
-    RenderWishes wanted;
+    RenderRequest wanted;
     while (waitForWork(wanted)) {
         try {
             work(wanted);
@@ -108,14 +108,14 @@ void Renderer::recover(const std::string& what) {
     session_.reset();
     films_.clear();
     logMessage(LogLevel::Error, what);
-    board_.update([&](Status& status) {
+    state_.update([&](Status& status) {
         status.render_error = what;
         status.stage.clear();
     });
 }
 
 /// One step of the way: a small picture, a larger one, more samples of the whole.
-void Renderer::work(const RenderWishes& wanted) {
+void Renderer::work(const RenderRequest& wanted) {
     if (!session_ || (applied_ && !applied_->sameDevice(wanted))) openBackend(wanted);
     if (!compiled_ || compiled_of_ != wanted.scene || compiled_aovs_ != wanted.aovs)
         compile(wanted, *wanted.scene);
@@ -129,11 +129,11 @@ void Renderer::work(const RenderWishes& wanted) {
         setView(wanted, pace_.nextDivisor(pixels, divisor_));
         return renderChunk(wanted, 1);
     }
-    const std::uint64_t count = pace_.samplesOfChunk(pixels, !board_.isWatched());
+    const std::uint64_t count = pace_.samplesOfChunk(pixels, !state_.isWatched());
     renderChunk(wanted, std::min(count, wanted.samplesWanted() - samples_));
 }
 
-void Renderer::openBackend(const RenderWishes& wanted) {
+void Renderer::openBackend(const RenderRequest& wanted) {
     applied_.reset();
     devices_.reset();
     compiled_.reset();
@@ -144,7 +144,7 @@ void Renderer::openBackend(const RenderWishes& wanted) {
     session_->openDevice();
 }
 
-void Renderer::compile(const RenderWishes& wanted, const Scene& scene) {
+void Renderer::compile(const RenderRequest& wanted, const Scene& scene) {
     applied_.reset();
     devices_.reset();
     compiled_.reset();
@@ -156,8 +156,8 @@ void Renderer::compile(const RenderWishes& wanted, const Scene& scene) {
     devices_.emplace(session_->group(), *compiled_);
 }
 
-/// A run begins: with the camera that is wished for.
-void Renderer::seeScene(const RenderWishes& wanted) {
+/// A run begins: with the camera that is requested.
+void Renderer::seeScene(const RenderRequest& wanted) {
     ++runs_;
     shown_ = false;
     seconds_ = 0;
@@ -175,13 +175,13 @@ void Renderer::seeScene(const RenderWishes& wanted) {
     seen_ = std::make_shared<const SeenScene>(std::move(seen));
 }
 
-void Renderer::setView(const RenderWishes& wanted, unsigned divisor) {
+void Renderer::setView(const RenderRequest& wanted, unsigned divisor) {
     applied_.reset();
     const Scene view = viewOf(wanted, divisor);
     const CompileOptions options = compileOptionsFor(session_->backend());
     const auto change = [&] {
         // The scene's own camera was warned of already.
-        const Silence silence;
+        const NullListener silent;
         return changeView(*compiled_, view, options);
     };
     if (!change()) {
@@ -197,14 +197,14 @@ void Renderer::setView(const RenderWishes& wanted, unsigned divisor) {
 }
 
 /// A hand that goes on moving shall see what it does: the first picture of a run is always finished.
-void Renderer::cancelWhereStale(const RenderWishes& wanted) {
+void Renderer::cancelWhereStale(const RenderRequest& wanted) {
     if (stopping_) throw Cancelled{};
     if (!shown_ || revision_ == taken_) return;
     const std::lock_guard lock(mutex_);
-    if (!wanted.samePicture(wishes_)) throw Cancelled{};
+    if (!wanted.samePicture(request_)) throw Cancelled{};
 }
 
-void Renderer::renderChunk(const RenderWishes& wanted, std::uint64_t count) {
+void Renderer::renderChunk(const RenderRequest& wanted, std::uint64_t count) {
     const Stopwatch rendering;
     devices_->render({.first_sample = samples_, .sample_count = count},
                      [&](double) { cancelWhereStale(wanted); });
@@ -231,13 +231,13 @@ std::shared_ptr<Film> Renderer::spareFilm(const FilmShape& shape) {
     return film;
 }
 
-void Renderer::handOn(const RenderWishes& wanted) {
+void Renderer::handOn(const RenderRequest& wanted) {
     const std::shared_ptr<Film> film = spareFilm(filmShapeOf(*compiled_));
     film->samples = SampleRanges();
     devices_->readFilm(*film);
     const bool complete = divisor_ == 1 && samples_ >= wanted.samplesWanted();
     const std::string device = shown_ ? std::string() : arrayText(session_->report().device);
-    board_.update([&](Status& status) {
+    state_.update([&](Status& status) {
         status.render_error.clear();
         status.stage.clear();
         status.width = seen_->width;

@@ -1,4 +1,4 @@
-/// The thread that renders: it makes its device, its scene and its film those that are wished for, again and
+/// The thread that renders: it makes its device, its scene and its film those that are requested, again and
 /// again, and hands on a film after each chunk.
 #pragma once
 
@@ -6,7 +6,7 @@
 #include "base/listener.h"
 #include "render/device_film.h"
 #include "render/session.h"
-#include "view/board.h"
+#include "view/view_state.h"
 #include "view/camera_moves.h"
 #include "view/pace.h"
 #include "view/snapshot.h"
@@ -25,7 +25,7 @@
 namespace crt {
 
 /// Scene and devices of a render.
-struct RenderWishes {
+struct RenderRequest {
     std::shared_ptr<const Scene> scene;  ///< Null: nothing yet.
     CameraPose pose;
     std::uint32_t aovs = 0;     ///< AOVs that the film shall hold.
@@ -36,21 +36,21 @@ struct RenderWishes {
 
     std::uint64_t samplesWanted() const { return samples > 0 ? samples : scene->sampler.samples; }
     /// True if the same samples of the same film satisfy both.
-    bool samePicture(const RenderWishes& other) const;
-    bool sameDevice(const RenderWishes& other) const;
+    bool samePicture(const RenderRequest& other) const;
+    bool sameDevice(const RenderRequest& other) const;
 };
 
 class Renderer {
 public:
     /// `hand_on` is called on the renderer's thread.
-    Renderer(RenderWishes wishes, Board& board, std::function<void(Snapshot)> hand_on);
+    Renderer(RenderRequest request, ViewState& state, std::function<void(Snapshot)> hand_on);
     /// Cancels what runs and waits for it.
     ~Renderer();
     Renderer(const Renderer&) = delete;
     Renderer& operator=(const Renderer&) = delete;
 
     /// [any thread]
-    void wish(const std::function<void(RenderWishes&)>& change);
+    void request(const std::function<void(RenderRequest&)>& change);
     /// Asks the thread to end, without waiting. [any thread]
     void stop();
 
@@ -58,31 +58,31 @@ private:
     struct Cancelled {};
 
     void run();
-    bool waitForWork(RenderWishes& wanted);
+    bool waitForWork(RenderRequest& wanted);
     bool hasWork() const;
-    void work(const RenderWishes& wanted);
+    void work(const RenderRequest& wanted);
     void recover(const std::string& what);
-    void openBackend(const RenderWishes& wanted);
-    void compile(const RenderWishes& wanted, const Scene& scene);
-    void seeScene(const RenderWishes& wanted);
-    void setView(const RenderWishes& wanted, unsigned divisor);
-    void renderChunk(const RenderWishes& wanted, std::uint64_t count);
-    void cancelWhereStale(const RenderWishes& wanted);
-    void handOn(const RenderWishes& wanted);
+    void openBackend(const RenderRequest& wanted);
+    void compile(const RenderRequest& wanted, const Scene& scene);
+    void seeScene(const RenderRequest& wanted);
+    void setView(const RenderRequest& wanted, unsigned divisor);
+    void renderChunk(const RenderRequest& wanted, std::uint64_t count);
+    void cancelWhereStale(const RenderRequest& wanted);
+    void handOn(const RenderRequest& wanted);
     std::shared_ptr<Film> spareFilm(const FilmShape& shape);
 
-    Board& board_;
+    ViewState& state_;
     const std::function<void(Snapshot)> hand_on_;
     mutable std::mutex mutex_;
     std::condition_variable changed_;
-    RenderWishes wishes_;
-    std::atomic<std::uint64_t> revision_{0};  ///< Of the wishes.
+    RenderRequest request_;
+    std::atomic<std::uint64_t> revision_{0};  ///< Of the request.
     std::atomic<bool> stopping_{false};
 
     // Of the thread.
     std::uint64_t taken_ = 0;              ///< The revision that is worked on.
     std::optional<std::uint64_t> failed_;  ///< The revision that went wrong: it is not tried again.
-    std::optional<RenderWishes> applied_;  ///< The request whose film is on the devices; nothing: none.
+    std::optional<RenderRequest> applied_;  ///< The request whose film is on the devices; nothing: none.
     std::unique_ptr<Session> session_;
     std::optional<CompiledScene> compiled_;
     std::shared_ptr<const Scene> compiled_of_;

@@ -10,7 +10,7 @@
 #include "scene/aov.h"
 #include "scene/light_units.h"
 #include "spectra/spectra.h"
-#include "view/silence.h"
+#include "view/null_listener.h"
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -161,7 +161,7 @@ SavedFile pngOf(const Snapshot& snapshot, const Display& display, const std::str
     requireWhole(snapshot);
     const bool colours = display.plane == "image";
     const auto write = [&](const std::string& path) {
-        const Silence silence;  // About a temporary file.
+        const NullListener silent;  // About a temporary file.
         if (!colours) return writeImage(path, OutputFormat::Png, imageOf(pictureOf(snapshot, display)));
         FilmIdentity identity = identityOf(snapshot);
         identity.record->development = developmentFor(display, *snapshot.seen->read);

@@ -14,10 +14,10 @@
 
 namespace crt {
 
-SceneSource::SceneSource(SceneRequest request, Board& board,
+SceneSource::SceneSource(SceneRequest request, ViewState& state,
                          std::function<void(std::shared_ptr<const Scene>)> take)
     : request_(std::move(request)),
-      board_(board),
+      state_(state),
       take_(std::move(take)),
       thread_([this, listener = currentListener()] {
           const ListenerScope scope(listener);
@@ -55,13 +55,13 @@ void SceneSource::run() {
 /// `files` are those to watch from then on.
 void SceneSource::read(std::vector<std::string>& files) {
     std::string what;
-    board_.update([](Status& status) { status.warnings.clear(); });
+    state_.update([](Status& status) { status.warnings.clear(); });
     try {
         auto scene = std::make_shared<const Scene>(loadScene(request_));
         files = scene->files_read;
         if (std::find(files.begin(), files.end(), request_.file) == files.end())
             files.push_back(request_.file);
-        board_.update([](Status& status) {
+        state_.update([](Status& status) {
             status.scene_error.clear();
             status.stage.clear();
         });
@@ -76,7 +76,7 @@ void SceneSource::read(std::vector<std::string>& files) {
     for (std::string& file : filesNamedIn(what))
         if (std::find(files.begin(), files.end(), file) == files.end()) files.push_back(std::move(file));
     logMessage(LogLevel::Error, what);
-    board_.update([&](Status& status) {
+    state_.update([&](Status& status) {
         status.scene_error = what;
         status.stage.clear();
     });

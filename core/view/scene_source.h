@@ -2,7 +2,7 @@
 #pragma once
 
 #include "render/job.h"
-#include "view/board.h"
+#include "view/view_state.h"
 
 #include <condition_variable>
 #include <functional>
@@ -18,7 +18,8 @@ class SceneSource {
 public:
     /// `take` gets each scene that could be read, on the source's thread. The errors of an invalid scene
     /// stay in the state until a valid one is read.
-    SceneSource(SceneRequest request, Board& board, std::function<void(std::shared_ptr<const Scene>)> take);
+    SceneSource(SceneRequest request, ViewState& state,
+                std::function<void(std::shared_ptr<const Scene>)> take);
     ~SceneSource();
     SceneSource(const SceneSource&) = delete;
     SceneSource& operator=(const SceneSource&) = delete;
@@ -28,7 +29,7 @@ private:
     void read(std::vector<std::string>& files);
 
     const SceneRequest request_;
-    Board& board_;
+    ViewState& state_;
     const std::function<void(std::shared_ptr<const Scene>)> take_;
     std::mutex mutex_;
     std::condition_variable stopped_;

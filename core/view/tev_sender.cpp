@@ -146,10 +146,10 @@ private:
     int socket_ = -1;
 };
 
-TevSender::TevSender(TevAddress address, std::string image_name, Board& board)
+TevSender::TevSender(TevAddress address, std::string image_name, ViewState& state)
     : address_(std::move(address)),
       name_(std::move(image_name)),
-      board_(board),
+      state_(state),
       thread_([this, listener = currentListener()] {
           const ListenerScope scope(listener);
           run();
@@ -212,7 +212,7 @@ void TevSender::send(const Snapshot& snapshot) {
 void TevSender::tell(const std::string& what) {
     if (std::exchange(told_, what) == what) return;
     logInfo("{}", what);
-    board_.update([&](Status& status) { status.tev = what; });
+    state_.update([&](Status& status) { status.tev = what; });
 }
 
 }  // namespace crt

@@ -1,7 +1,7 @@
 /// Sends the image to the viewer tev by its protocol: packets over TCP, little-endian.
 #pragma once
 
-#include "view/board.h"
+#include "view/view_state.h"
 #include "view/snapshot.h"
 
 #include <condition_variable>
@@ -32,7 +32,7 @@ std::vector<std::uint8_t> tevUpdateImage(const std::string& name, std::uint32_t 
 /// again.
 class TevSender {
 public:
-    TevSender(TevAddress address, std::string image_name, Board& board);
+    TevSender(TevAddress address, std::string image_name, ViewState& state);
     ~TevSender();
     TevSender(const TevSender&) = delete;
     TevSender& operator=(const TevSender&) = delete;
@@ -49,7 +49,7 @@ private:
 
     const TevAddress address_;
     const std::string name_;
-    Board& board_;
+    ViewState& state_;
     std::mutex mutex_;
     std::condition_variable changed_;
     std::optional<Snapshot> waiting_;

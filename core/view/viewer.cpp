@@ -15,18 +15,18 @@
 namespace crt {
 namespace {
 
-RenderWishes wishesOf(const ViewOptions& options) {
-    RenderWishes wishes;
-    wishes.samples = options.samples;
-    wishes.backend = options.backend;
-    wishes.integrator = options.integrator;
-    return wishes;
+RenderRequest requestOf(const ViewOptions& options) {
+    RenderRequest request;
+    request.samples = options.samples;
+    request.backend = options.backend;
+    request.integrator = options.integrator;
+    return request;
 }
 
-std::unique_ptr<TevSender> tevOf(const ViewOptions& options, Board& board) {
+std::unique_ptr<TevSender> tevOf(const ViewOptions& options, ViewState& state) {
     if (!options.tev) return nullptr;
     const std::string name = std::filesystem::path(options.scene.file).filename().string();
-    return std::make_unique<TevSender>(*options.tev, name, board);
+    return std::make_unique<TevSender>(*options.tev, name, state);
 }
 
 /// AOVs that each film holds: the surface that a pixel shows, and its distance if a lens can be focused on
@@ -42,17 +42,17 @@ Viewer::Viewer(const ViewOptions& options)
       file_stem_(std::filesystem::path(options.scene.file).stem().string()),
       listener_(
           [this](LogLevel level, std::string_view message) { hear(level, message); }, LogLevel::Debug,
-          [this](const std::string& what) { board_.update([&](Status& status) { status.stage = what; }); }),
+          [this](const std::string& what) { state_.update([&](Status& status) { status.stage = what; }); }),
       scope_(listener_),
-      tev_(tevOf(options, board_)),
-      developer_(board_, options.integrator.threads),
-      renderer_(wishesOf(options), board_,
+      tev_(tevOf(options, state_)),
+      developer_(state_, options.integrator.threads),
+      renderer_(requestOf(options), state_,
                 [this](Snapshot snapshot) {
                     if (tev_) tev_->take(snapshot);
                     developer_.take(std::move(snapshot));
                 }),
-      source_(options.scene, board_, [this](auto scene) { takeScene(std::move(scene)); }) {
-    board_.update([&, program = randomToken()](Status& status) {
+      source_(options.scene, state_, [this](auto scene) { takeScene(std::move(scene)); }) {
+    state_.update([&, program = randomToken()](Status& status) {
         status.file = options.scene.file;
         status.program = program;
     });
@@ -61,7 +61,7 @@ Viewer::Viewer(const ViewOptions& options)
 Viewer::~Viewer() { stop(); }
 
 void Viewer::stop() {
-    board_.close();
+    state_.close();
     renderer_.stop();
 }
 
@@ -72,7 +72,7 @@ void Viewer::hear(LogLevel level, std::string_view message) {
     }
     if (level != LogLevel::Warning) return;
     constexpr std::size_t kMostWarnings = 20;
-    board_.update([&](Status& status) {
+    state_.update([&](Status& status) {
         std::vector<std::string>& all = status.warnings;
         if (all.size() < kMostWarnings && std::find(all.begin(), all.end(), message) == all.end())
             all.emplace_back(message);
@@ -93,11 +93,11 @@ void Viewer::takeScene(std::shared_ptr<const Scene> scene) {
         display.white = "scene";
         developer_.setDisplay(display);
     }
-    renderer_.wish([&](RenderWishes& wishes) {
-        wishes.scene = scene_;
-        wishes.pose = pose_;
-        wishes.aovs = basicAovs(*scene_) | aovs_;
-        tellSettings(wishes);
+    renderer_.request([&](RenderRequest& request) {
+        request.scene = scene_;
+        request.pose = pose_;
+        request.aovs = basicAovs(*scene_) | aovs_;
+        tellSettings(request);
     });
 }
 
@@ -132,15 +132,15 @@ void Viewer::changeOnce(const ViewChange& change) {
     // Once looked at, the planes stay in the film: looking at another needs no other render.
     if (aovsOfPlane(display.plane) & kAovsOfFirstHits) aovs_ = kAovsOfFirstHits;
     if (!(display == developer_.display())) developer_.setDisplay(display);
-    renderer_.wish([&](RenderWishes& wishes) {
-        if (change.paused) wishes.paused = *change.paused;
-        if (change.toggle_paused) wishes.paused = !wishes.paused;
-        if (change.samples) wishes.samples = *change.samples;
-        if (change.backend) wishes.backend = *change.backend;
-        if (change.backend || change.device) wishes.integrator.device = change.device.value_or("");
-        wishes.pose = pose_;
-        if (scene_) wishes.aovs = basicAovs(*scene_) | aovs_;
-        tellSettings(wishes);
+    renderer_.request([&](RenderRequest& request) {
+        if (change.paused) request.paused = *change.paused;
+        if (change.toggle_paused) request.paused = !request.paused;
+        if (change.samples) request.samples = *change.samples;
+        if (change.backend) request.backend = *change.backend;
+        if (change.backend || change.device) request.integrator.device = change.device.value_or("");
+        request.pose = pose_;
+        if (scene_) request.aovs = basicAovs(*scene_) | aovs_;
+        tellSettings(request);
     });
 }
 
@@ -207,10 +207,10 @@ Display Viewer::displayAfter(const ViewChange& change) const {
 }
 
 /// Before anything is rendered by them.
-void Viewer::tellSettings(const RenderWishes& wishes) {
+void Viewer::tellSettings(const RenderRequest& request) {
     const Display display = developer_.display();
-    board_.update([&](Status& status) {
-        status.paused = wishes.paused;
+    state_.update([&](Status& status) {
+        status.paused = request.paused;
         status.white = display.white;
         status.plane = display.plane;
         if (!scene_) return;
@@ -221,7 +221,7 @@ void Viewer::tellSettings(const RenderWishes& wishes) {
         status.fov_moved = pose_.tan_half_fov != poseOf(scene_->camera).tan_half_fov;
         status.exposure_ev = display.exposure_ev.value_or(scene_->film.exposure_ev);
         status.whites = whiteNames(*scene_);
-        status.samples_wanted = wishes.samplesWanted();
+        status.samples_wanted = request.samplesWanted();
     });
 }
 

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "base/listener.h"
-#include "view/board.h"
+#include "view/view_state.h"
 #include "view/developer.h"
 #include "view/messages.h"
 #include "view/page_changes.h"
@@ -45,7 +45,7 @@ public:
     Viewer(const Viewer&) = delete;
     Viewer& operator=(const Viewer&) = delete;
 
-    Board& board() { return board_; }
+    ViewState& state() { return state_; }
     const ListenerRef& listener() const { return listener_.ref(); }
 
     /// Makes the changes in order, and those of a page that numbers them once, however often it sends them.
@@ -71,11 +71,11 @@ private:
     CameraPose poseAfter(const ViewChange& change) const;
     double focusAt(const std::array<double, 2>& place) const;
     Display displayAfter(const ViewChange& change) const;
-    void tellSettings(const RenderWishes& wishes);
+    void tellSettings(const RenderRequest& request);
 
     const ListenerRef outer_;
     const std::string file_stem_;
-    Board board_;
+    ViewState state_;
     Listener listener_;
     const ListenerScope scope_;
 

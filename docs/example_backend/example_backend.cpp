@@ -10,7 +10,7 @@ namespace {
 
 using crt::plugin::Host;
 
-// What `crt plugins` lists. A backend that finds nothing to run on throws
+// The entries of `crt plugins`. A backend that finds nothing to run on throws
 // crt::plugin::PluginError(CRT_NO_DEVICE, "why").
 std::vector<CrtDevice> listDevices(const Host&) {
     // The score decides between devices and tells how much is to be expected: a CPU about its number of
@@ -24,8 +24,8 @@ public:
     ExampleIntegrator(const Host& host, const CrtCreateInfo& info)
         : host_(host), device_(crt::plugin::chooseDevice(listDevices(host), info.device)) {}
 
-    // The scene is one block of bytes without pointers: copied as it is, or uploaded to a device in one go.
-    // Film and report begin anew.
+    // The scene is one block of bytes without pointers: copied as it is, or uploaded to a device in one
+    // copy. Film and report start empty.
     void setScene(const CrtSceneBlob& scene) {
         scene_.resize((scene.size_bytes + sizeof(Block) - 1) / sizeof(Block));
         std::memcpy(scene_.data(), scene.data, scene.size_bytes);

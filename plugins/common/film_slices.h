@@ -1,6 +1,6 @@
-/// How many films a launch should add to. A launch of few pixels and many samples leaves a GPU partly idle;
-/// with its samples divided between slices, each with a film of its own, it fills the device. The sums of
-/// all slices give the same film (core/film/film.h).
+/// Chooses the number of films that a launch adds to. A launch of few pixels and many samples leaves a GPU
+/// partly idle; with its samples divided between slices, each with a separate film, it fills the device. The
+/// sums of all slices give the same film (core/film/film.h).
 #pragma once
 
 #include <algorithm>
@@ -10,12 +10,13 @@ namespace crt::plugin {
 
 inline std::uint64_t divideUp(std::uint64_t a, std::uint64_t b) { return (a + b - 1) / b; }
 
-/// In how many parts, each with a film of its own, a launch of `blocks` blocks should divide its samples so
-/// that a device that holds `resident_blocks` at once is full, and does not end on a few last blocks. At
-/// most `most`.
+/// The number of parts, each with a separate film, into which a launch of `blocks` blocks should divide its
+/// samples so that a device that holds `resident_blocks` at once is full, and does not end on a few last
+/// blocks. At most `most`.
 inline std::uint32_t chooseSlices(std::uint64_t blocks, std::uint64_t resident_blocks, std::uint32_t samples,
                                   std::uint64_t most) {
-    // The device is filled so many times that its idle end, half a filling on average, is a few percent.
+    // The device is filled this number of times, so that its idle end, half a filling on average, is a few
+    // percent.
     constexpr std::uint64_t kFillings = 16;
     // A thread's paths should outweigh its start and its share of crt_add_slices, unless that leaves the
     // device empty.
@@ -26,7 +27,7 @@ inline std::uint32_t chooseSlices(std::uint64_t blocks, std::uint64_t resident_b
         std::max<std::uint64_t>(1, std::min({wanted, samples / least_samples, most, kGridRows})));
 }
 
-/// Bytes that films of slices may take on a device of so many bytes, so many of them free.
+/// Bytes that films of slices may take on a device with this memory in total and this much of it free.
 inline std::uint64_t sliceBudget(std::uint64_t device_bytes, std::uint64_t free_bytes) {
     constexpr std::uint64_t kMostBytes = std::uint64_t{512} << 20;
     constexpr std::uint64_t kShareOfDevice = 16, kShareOfFree = 2;

@@ -1,4 +1,4 @@
-/// What a kernel of a GPU-like backend is compiled from.
+/// The inputs from which a kernel of a GPU-like backend is compiled.
 #pragma once
 
 #include <cstdint>

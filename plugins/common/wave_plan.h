@@ -25,7 +25,7 @@ struct WavePlan {
     std::uint32_t queues() const { return static_cast<std::uint32_t>(kernels.size() - 1); }
     /// Queues that are shaded: all but that of choices.
     std::uint32_t shaders() const { return queues() - (queue_of_choice != CRT_NONE ? 1 : 0); }
-    /// That a slot of so many rows takes on the device.
+    /// Bytes that a slot of this number of rows takes on the device.
     std::uint64_t bytesPerSlot(std::uint32_t rows) const {
         return rows * sizeof(kernel::vec4) +
                (CRT_WAVE_WORDS(1, queues()) - CRT_WAVE_WORDS(0, queues())) * sizeof(std::uint32_t);
@@ -40,7 +40,7 @@ const Row* rowsOf(const void* blob, const kernel::CrtSpan& span) {
     return CRT_ARRAY(Row, static_cast<const unsigned char*>(blob), span);
 }
 
-/// What some materials have and others lack.
+/// Features that some materials have and others lack.
 constexpr std::uint64_t kOfMaterials = CRT_FEATURES_MATERIALS | CRT_FEATURE_THIN_FILM |
                                        CRT_FEATURE_ANISOTROPY | CRT_FEATURE_NORMAL_MAP | CRT_FEATURE_FUZZ |
                                        CRT_FEATURE_CLEARCOAT | CRT_FEATURE_ROUGH_BASE;
@@ -119,8 +119,8 @@ inline kernel::CrtWave waveOf(const WavePlan& plan, const Launch& launch, std::u
     return wave;
 }
 
-/// Calls `run(part)` with the launch in bands of so many rows of pixels that their slots fit `slots`;
-/// `across`: slots that one row of blocks takes.
+/// Calls `run(part)` with the launch in bands of rows of pixels such that their slots fit `slots`; `across`:
+/// slots that one row of blocks takes.
 template <class Run>
 void inBands(const Launch& launch, std::uint64_t slots, std::uint64_t across, Run&& run) {
     const auto rows =

@@ -25,7 +25,7 @@ namespace {
 
 using plugin::KernelCache;
 
-/// A compiler that takes longer than this hangs. Nobody may be there any more to end it.
+/// A compiler that takes longer than this hangs. There may be no process left to end it.
 constexpr unsigned kMostSeconds = 120;
 
 double secondsSince(std::chrono::steady_clock::time_point start) {
@@ -163,14 +163,15 @@ struct SpawnSettings {
 
 pid_t spawn(const std::string& program, int job, int answer) {
     SpawnSettings settings;
-    // Nothing of the caller's stays open: whoever reads its output shall see the end of it when it ends.
+    // It keeps no descriptor of the caller open: a reader of the caller's output shall see its end when the
+    // caller ends.
     posix_spawn_file_actions_adddup2(&settings.actions, job, STDIN_FILENO);
     posix_spawn_file_actions_adddup2(&settings.actions, answer, STDOUT_FILENO);
     posix_spawn_file_actions_addopen(&settings.actions, STDERR_FILENO, "/dev/null", O_WRONLY, 0);
 #if __GLIBC_PREREQ(2, 34)
     posix_spawn_file_actions_addclosefrom_np(&settings.actions, STDERR_FILENO + 1);
 #endif
-    // A session of its own: Ctrl-C is for the render.
+    // A separate session: Ctrl-C is for the render.
     sigset_t none, all;
     sigemptyset(&none);
     sigfillset(&all);

@@ -1,9 +1,9 @@
 /// A compilation by NVRTC in a process of its own (the program crt_nvrtc beside the plugin).
 ///
 /// NVRTC cannot be told to stop, and a process cannot end while one of its threads is inside of it:
-/// destructors of static objects would take the library apart under that thread. So whoever rendered with
-/// the precompiled kernel meanwhile would wait for a kernel that it no longer needs. A process of its own is
-/// left behind instead: it puts the kernel into the cache, for the next run, and ends
+/// destructors of static objects would take the library apart under that thread. So a render with the
+/// precompiled kernel would wait at its end for a kernel that it no longer needs. A separate process is left
+/// behind instead: it puts the kernel into the cache, for the next run, and ends
 /// (docs/decisions/0011-compiler-process.md).
 #pragma once
 
@@ -20,7 +20,7 @@
 
 namespace crt::cuda {
 
-/// What to compile, and where to keep it.
+/// The kernel to compile, and the place to keep it.
 struct CompileJob {
     std::string nvrtc_path;  ///< As Nvrtc::path() has it.
     std::string text;

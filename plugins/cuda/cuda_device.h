@@ -54,7 +54,7 @@ struct Device {
     int arch = 0;  ///< 10 · major + minor of its compute capability.
     std::uint32_t multiprocessors = 0;
     std::uint64_t memory_bytes = 0;
-    std::string unusable;  ///< Why it cannot be used; empty when it can.
+    std::string unusable;  ///< Reason why it cannot be used; empty if it can.
 
     CrtDevice describe() const;
 };
@@ -85,7 +85,7 @@ private:
 };
 
 /// Throws PluginError(CRT_OUT_OF_MEMORY), with the numbers, where the current device has less than `bytes`
-/// free. That it has more promises nothing: memory is shared with other programs.
+/// free. A larger amount of free memory is no promise: memory is shared with other programs.
 void requireFree(std::uint64_t bytes, const Device& device, const char* what);
 
 /// Plain device memory.

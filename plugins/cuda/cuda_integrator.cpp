@@ -101,7 +101,7 @@ void CudaIntegrator::setScene(const CrtSceneBlob& blob) {
     } else if (kernel_choice_ != CRT_KERNEL_FULL) {
         wanted = {{Entry::Render, scene.features}};
     }
-    // What it has learnt holds for the next scene, too, or for the next band of a film.
+    // Its measurements hold for the next scene, too, or for the next band of a film.
     if (paced_for_waves_ != wavefront_.has_value()) {
         paced_for_waves_ = wavefront_.has_value();
         pacer_ = pacerFor(paced_for_waves_, device_);
@@ -144,7 +144,7 @@ std::uint32_t CudaIntegrator::ensureSlices(std::uint32_t slices) {
     try {
         slices_ = allocateFilm(slices, "the film's slices");
     } catch (const plugin::PluginError& error) {
-        // Somebody was faster, or what is free lies in pieces.
+        // Another process took the memory first, or the free memory is fragmented.
         if (error.status() != CRT_OUT_OF_MEMORY) throw;
         host_.log(CRT_LOG_DEBUG, std::string("cuda: continuing without slices: ") + error.what());
         return 1;

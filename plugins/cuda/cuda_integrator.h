@@ -35,13 +35,13 @@ public:
     void report(CrtBackendReport& report);
 
 private:
-    /// What kernels add to: the film, or a row of films of the same shape, one a slice.
+    /// The target of kernels: the film, or a row of films of the same shape, one per slice.
     struct DeviceFilm {
         Memory sums, counts, primitives;
         std::uint64_t bytes() const { return sums.bytes() + counts.bytes() + primitives.bytes(); }
     };
     DeviceFilm allocateFilm(std::uint64_t copies, const char* what);
-    /// Makes room for so many slices, or for as many as free memory allows; how many there may be.
+    /// Makes room for this number of slices, or for as many as free memory allows; returns the number.
     std::uint32_t ensureSlices(std::uint32_t slices);
     void noteMemory();
     double launch(const Launch& launch);
@@ -62,7 +62,7 @@ private:
     bool paced_for_waves_ = false;
 
     std::unique_ptr<CudaProgram> program_;
-    std::optional<Wavefront> wavefront_;  ///< Where the scene wants it.
+    std::optional<Wavefront> wavefront_;  ///< Allocated if the scene requests it.
     kernel::CrtScene scene_{};  ///< The blob's header.
     Memory blob_, rays_;
     DeviceFilm film_, slices_;

@@ -36,7 +36,7 @@ public:
     /// "NVRTC 13.0".
     std::string name() const;
 
-    /// Whether it makes machine code for compute capability arch / 10.
+    /// True if it makes machine code for compute capability arch / 10.
     bool supports(int arch) const;
 
     /// Compiles `text`, whose errors call it `file`. Throws std::runtime_error with the first 20 lines of

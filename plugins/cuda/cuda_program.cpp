@@ -91,7 +91,7 @@ void openCompiler() noexcept {
     try {
         nvrtc();
     } catch (...) {
-        // Whoever needs it tries again, and tells.
+        // The next use tries again, and reports the error.
     }
 }
 

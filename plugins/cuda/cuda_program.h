@@ -1,5 +1,5 @@
 /// From what a scene needs to kernels that can be launched: the precompiled one at once, and the lean ones
-/// from the disk cache or, compiled by processes of their own, as soon as all are ready. They give the same
+/// from the disk cache or, compiled by separate processes, as soon as all are ready. They give the same
 /// bits, so a render may go over from one to the other between launches.
 #pragma once
 
@@ -65,7 +65,7 @@ public:
     CudaProgram& operator=(const CudaProgram&) = delete;
 
     /// The kernels to be launched by now: those wanted, in their order, once all are there; before that, and
-    /// where they cannot be had, the precompiled crt_render alone.
+    /// if they are not available, the precompiled crt_render alone.
     const std::vector<Module>& current();
 
     /// Goes on with the precompiled kernel, which gives the same image.
@@ -74,10 +74,10 @@ public:
     const std::vector<KernelSpec>& wanted() const { return wanted_; }
     /// All lean kernels came from the disk cache.
     bool fromCache() const { return from_cache_; }
-    /// What the compilers took, added up.
+    /// Times of the compilers, added up.
     double compileSeconds() const { return compile_seconds_; }
     double cacheSeconds() const { return cache_seconds_; }
-    /// Which kernels ran: "precompiled, then NVRTC 13.0 sm_90".
+    /// The kernels that ran: "precompiled, then NVRTC 13.0 sm_90".
     std::string description() const;
 
 private:

@@ -77,7 +77,7 @@ void Wavefront::runPass(const std::vector<Module>& kernels, kernel::CrtScene sce
     cuda.check(cuda.cuLaunchKernel(kernels.front().kernel(), blocks, 1, 1, kBlock, 1, 1, 0, nullptr,
                                    trace_arguments, nullptr),
                "launching the kernel that traces");
-    // How long a queue is the device alone knows: as many blocks as it holds at once take turns.
+    // Only the device has the length of a queue: as many blocks as it holds at once take turns.
     const auto most = [&](const Module& kernel) {
         return std::min(blocks, kernel.residentBlocks() * device_.multiprocessors);
     };

@@ -14,7 +14,7 @@
 
 namespace crt::cuda {
 
-/// What a wave adds to, on the device.
+/// The target of a wave, on the device.
 struct WaveTarget {
     CUdeviceptr blob, sums, counts, primitives, rays;
 };
@@ -27,17 +27,17 @@ public:
     const plugin::WavePlan& plan() const { return plan_; }
     std::uint64_t bytes() const { return rows_.bytes() + words_.bytes(); }
 
-    /// How many slices there may be where so many blocks of pixels lie side by side.
+    /// The number of slices possible if this number of blocks of pixels lie side by side.
     std::uint32_t mostSlices(std::uint64_t blocks_across) const;
 
-    /// Takes all samples of a launch, each of `slices` equal parts into a film of its own. `kernels`: those
-    /// of plan(). Waits for the end, and calls `meanwhile` between passes, which may throw. Throws
+    /// Takes all samples of a launch, each of `slices` equal parts into a separate film. `kernels`: those of
+    /// plan(). Waits for the end, and calls `meanwhile` between passes, which may throw. Throws
     /// PluginError: CRT_OUT_OF_MEMORY before anything is added.
     void launch(const std::vector<Module>& kernels, const kernel::CrtScene& scene, const Launch& launch,
                 std::uint32_t slices, const WaveTarget& target, const std::function<void()>& meanwhile);
 
 private:
-    /// Room for at least so many slots, or for as many as memory allows.
+    /// Room for at least this number of slots, or for as many as memory allows.
     std::uint64_t ensureSlots(std::uint64_t wanted, std::uint64_t least);
     kernel::CrtWave waveOf(const Launch& launch, std::uint32_t slices, const WaveTarget& target) const;
     void runPass(const std::vector<Module>& kernels, kernel::CrtScene scene, kernel::CrtWave wave,

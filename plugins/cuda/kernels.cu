@@ -4,7 +4,7 @@
  * scene needs.
  *
  * crt_render: a thread renders one pixel over a range of samples. Where the image is too small to fill the
- * device, the range is split over `slices` rows of the grid: each adds to a film of its own, and
+ * device, the range is split over `slices` rows of the grid: each adds to a separate film, and
  * crt_add_slices then adds those to the film in the order of the samples, so the result does not depend on
  * which block ran first.
  *
@@ -17,7 +17,7 @@
 #include "kernel/schedule/wavefront.h"
 #endif
 
-/* Which entry points this module has. */
+/* The entry points of this module. */
 #define CRT_ENTRY_RENDER 1
 #define CRT_ENTRY_TRACE 2
 #define CRT_ENTRY_SHADE 4
@@ -34,7 +34,7 @@
  * them up. */
 #define CRT_RAY_COUNTERS 1024u
 
-/* Blocks that a multiprocessor should hold at once: what whoever compiles this trades registers for
+/* Blocks that a multiprocessor should hold at once: the host chooses it when compiling, against registers
  * (cuda_program.h). */
 #ifndef CRT_BLOCKS_PER_SM
 #define CRT_BLOCKS_PER_SM 4

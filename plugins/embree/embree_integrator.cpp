@@ -56,7 +56,7 @@ EmbreeIntegrator::EmbreeIntegrator(const plugin::Host& host, const CrtCreateInfo
     info_.device = nullptr;  // the host's string is not ours to keep
 }
 
-/// Whether the scene that is set is given again with another camera or another size or window of the film,
+/// True if the scene that is set is given again with another camera or another size or window of the film,
 /// as viewers and bands do: then its tree is the same.
 bool EmbreeIntegrator::differsInViewAlone(const CrtSceneBlob& given) const {
     if (!blob_ || blob_bytes_ != given.size_bytes) return false;
@@ -107,7 +107,7 @@ void EmbreeIntegrator::setScene(const CrtSceneBlob& scene_blob) {
 
 std::uint32_t EmbreeIntegrator::tileSize(const CrtRenderRange& range) const {
     if (info_.tile_size != 0) return info_.tile_size;
-    // Large enough to stay in the cache's good books, small enough that every thread gets several.
+    // Large enough to be cache friendly, small enough that every thread gets several.
     std::uint32_t size = 16;
     const auto tiles = [&] {
         return static_cast<std::uint64_t>((range.x1 - range.x0 + size - 1) / size) *

@@ -38,7 +38,7 @@ const Leaf8& nothing() {
     return leaf;
 }
 
-/// What Embree hands back to the functions below.
+/// The nodes that Embree returns to the functions below.
 struct Building {
     const CrtTriangle* triangles;
     const std::function<void(double)>* progress;
@@ -112,8 +112,8 @@ RTCBounds boundsOf(const RTCBuildPrimitive* const* primitives, unsigned count) {
     return b;
 }
 
-/// The triangles as a leaf, and each other slot, with a box of its own, as another: an instance is not to be
-/// entered because a ray meets its neighbour. Where there are several of these, a node holds them.
+/// The triangles as a leaf, and each other slot, with a separate box, as another leaf: a ray that meets its
+/// neighbour must not enter an instance. Where there are several of these, a node holds them.
 void* createLeaf(RTCThreadLocalAllocator allocator, const RTCBuildPrimitive* primitives, std::size_t count,
                  void* building) {
     const CrtTriangle* triangles = static_cast<const Building*>(building)->triangles;

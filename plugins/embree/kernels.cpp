@@ -34,7 +34,7 @@ using namespace kernel;
     return crt_pixel_vertex(&ctx, &work, &rays) != 0;
 }
 
-// A path may have no end: call the host every so many rays, so that it can cancel.
+// A path may have no end: call the host after every fixed number of rays, so that it can cancel.
 bool isCancelled(const TileJob& job, const CrtRayCount& rays) {
     constexpr u32 kRaysBetweenLooks = 1u << 16;
     return rays.closest % kRaysBetweenLooks == 0 && job.cancelled(job.host);

@@ -74,7 +74,7 @@ inline u32 hitsOf(const Leaf8& leaf, const CrtShear& ray, f32 limit, Hits8* hits
     return lanes;
 }
 
-/// What is left to be visited, and where the ray enters it.
+/// A node to visit, and the distance at which the ray enters it.
 struct Stacked {
     Child child;
     f32 enter;

@@ -6,7 +6,7 @@
  * PoCL compiles a kernel for one group size.
  */
 
-/* Which entry points this program has. */
+/* The entry points of this program. */
 #define CRT_ENTRY_RENDER 1
 #define CRT_ENTRY_TRACE 2
 #define CRT_ENTRY_SHADE 4
@@ -51,8 +51,8 @@ __kernel __attribute__((reqd_work_group_size(CRT_GROUP_X, CRT_GROUP_Y, 1))) void
 #endif
 
 #if CRT_ENTRIES & (CRT_ENTRY_TRACE | CRT_ENTRY_SHADE | CRT_ENTRY_CHOOSE)
-/* A wave of `queues` queues. What a kernel is given by value may hold no pointers in OpenCL: `header` is the
-   host's CrtWave, whose pointers mean nothing here. */
+/* A wave of `queues` queues. In OpenCL, arguments by value must not contain pointers: `header` is the host's
+   CrtWave, whose pointers are invalid here. */
 static inline CrtWave crt_wave_given(__global const uchar *header, uint queues, __global float4 *rows,
                                      __global uint *words) {
     CrtWave wave = *(__global const CrtWave *)header;

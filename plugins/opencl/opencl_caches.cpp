@@ -22,7 +22,7 @@ fs::path folderOfPocl() {
     return {};
 }
 
-/// True if nobody else can write to the folder, which is made if it is not there, nor to those above it.
+/// True if no other user can write to the folder, which is made if it does not exist, nor to those above it.
 bool isOurs(const fs::path& folder) {
     std::error_code error;
     fs::create_directories(folder, error);

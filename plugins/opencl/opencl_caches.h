@@ -1,4 +1,4 @@
-/// Where drivers keep compiled kernels.
+/// The folders in which drivers keep compiled kernels.
 #pragma once
 
 namespace crt::opencl {

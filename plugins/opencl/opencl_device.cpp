@@ -51,7 +51,7 @@ std::string platformText(cl_platform_id platform, cl_platform_info what) {
     return trimmed(text);
 }
 
-/// What a device lacks for the same bits as every other backend; empty when nothing.
+/// Features that a device lacks for the same bits as every other backend; empty if there are none.
 std::string whatIsMissing(cl_device_id id, bool is_cpu) {
     if (!deviceInfo<cl_bool>(id, CL_DEVICE_AVAILABLE)) return "is not available";
     if (!deviceInfo<cl_bool>(id, CL_DEVICE_COMPILER_AVAILABLE)) return "has no compiler";

@@ -18,7 +18,7 @@ namespace crt::opencl {
 std::string errorName(cl_int error);
 
 /// Throws unless `result` is CL_SUCCESS: one sentence that begins with `what` and names the error. Lack of
-/// memory gets a status of its own.
+/// memory has a separate status.
 void check(cl_int result, const std::string& what);
 
 /// Owns one OpenCL object.
@@ -62,7 +62,7 @@ struct Device {
     std::uint32_t compute_units = 0, address_bits = 0;
     std::uint64_t memory_bytes = 0;
     std::uint64_t largest_buffer_bytes = 0;
-    std::string unusable;  ///< Why it cannot give the same bits as the others; empty when it can.
+    std::string unusable;  ///< Reason why it cannot give the same bits as the others; empty if it can.
 
     double score() const;
     CrtDevice describe() const;

@@ -128,7 +128,7 @@ void OpenClIntegrator::setScene(const CrtSceneBlob& blob) {
         }
     }
     useKernels(wanted);
-    // What it has learnt holds for the next scene, too, or for the next band of a film.
+    // Its measurements hold for the next scene, too, or for the next band of a film.
     if (paced_for_waves_ != wavefront_.has_value()) {
         paced_for_waves_ = wavefront_.has_value();
         pacer_ = pacerFor(paced_for_waves_, device_);

@@ -26,7 +26,7 @@ private:
     std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
-/// What the compiler said, at most `line_count` lines of it.
+/// The output of the compiler, at most `line_count` lines of it.
 std::string buildLog(cl_program program, cl_device_id target, int line_count) {
     std::size_t size = 0;
     if (clGetProgramBuildInfo(program, target, CL_PROGRAM_BUILD_LOG, 0, nullptr, &size) != CL_SUCCESS ||
@@ -129,8 +129,8 @@ Program buildProgram(const plugin::Host& host, const Device& device, const Sessi
     if (!built.program) {
         const Stopwatch compile_time;
         built.program = fromText(session, device, text, options);
-        // PoCL generates the machine code only at the first launch, 0.7 s that no time of ours counts, and
-        // keeps it in a cache of its own.
+        // PoCL generates the machine code only at the first launch, 0.7 s that none of crt's times include,
+        // and keeps it in a separate cache.
         const std::vector<unsigned char> compiled = programBinary(built.program.get());
         built.compile_seconds = compile_time.seconds();
 

@@ -18,7 +18,7 @@ constexpr std::uint64_t kMostSlots = std::uint64_t{1} << 21;
 /// Groups that shade a queue, a compute unit; they take turns where it is longer.
 constexpr std::uint64_t kGroupsPerUnit = 16;
 
-/// Slots of a row of blocks that covers so many pixels.
+/// Slots of a row of blocks that covers this number of pixels.
 std::uint64_t slotsAcross(std::uint32_t width) {
     return divideUp(width, CRT_WAVE_BLOCK_WIDTH) * CRT_WAVE_BLOCK;
 }
@@ -73,7 +73,7 @@ void Wavefront::runWave(const std::vector<Program>& kernels, const kernel::CrtWa
     check(clEnqueueWriteBuffer(queue, header_.get(), CL_TRUE, 0, sizeof wave, &wave, 0, nullptr, nullptr),
           "writing the header of a wave");
     const std::uint64_t blocks = wave.slots / CRT_WAVE_BLOCK;
-    // How long a queue is the device alone knows.
+    // Only the device has the length of a queue.
     const std::uint64_t shading = std::min(blocks, kGroupsPerUnit * session_.compute_units);
     plugin::runPasses(
         wave,

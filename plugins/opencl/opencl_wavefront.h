@@ -13,13 +13,13 @@
 
 namespace crt::opencl {
 
-/// Whether scenes of many materials are rendered in waves there: on GPUs. On a processor the lanes do not
+/// True if scenes of many materials are rendered in waves there: on GPUs. On a processor the lanes do not
 /// wait for each other, and waves cost a fifth to a third (docs/decisions/0044-waves-for-opencl.md); with
 /// CRT_OPENCL_WAVES=1 in the environment it takes them too, so that tests and measurements can. Everywhere,
 /// where a path may outlast a launch (backend/sdk/gpu_schedule.h).
 bool takesWaves(const Device& device, std::uint32_t max_depth);
 
-/// What a wave reads and what it adds to, on the device.
+/// The input and the target of a wave, on the device.
 struct WaveTarget {
     cl_mem scene, sums, counts, primitives, rays;
 };
@@ -27,7 +27,7 @@ struct WaveTarget {
 /// Launches waves. The film has one slice: that of crt_render.
 class Wavefront {
 public:
-    /// Gives a buffer of so many bytes for what the sentence says. Throws PluginError: CRT_OUT_OF_MEMORY.
+    /// Makes a buffer of this size for the purpose in the sentence. Throws PluginError: CRT_OUT_OF_MEMORY.
     using Allocate = std::function<Buffer(std::uint64_t bytes, const char* what)>;
 
     /// `blob`: a compiled scene. Takes the memory of its slots: as many as its film fills, or as the device

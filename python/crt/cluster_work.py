@@ -135,7 +135,7 @@ class Work:
             part_seconds = min(part_seconds, seconds_left)
         left = self.missing.left
         soon = until - self.samples - sum(end - first for first, end, _ in self.running.values())
-        # What waits behind another part ends last.
+        # A task that waits behind another part ends last.
         spare = seconds_left is None and not self.size.shrinks(part_seconds, min(soon, left), self.threads)
         most = self.threads + (-(-self.threads // 8) if spare else 0)
         if not self.size.is_known(min(part_seconds, self.threads / PARTS_A_SECOND_AT_FIRST)):
@@ -245,8 +245,8 @@ class Work:
         return False
 
     def ends_within(self, seconds):
-        """Whether all parts will be done so soon that what is done can come with them. A checkpoint is not
-        put off, nor are the films of so many workers that the end would be all sums."""
+        """True if all parts will be done so soon that what is done can come with them. A checkpoint is not
+put off, nor are the films of a number of workers at which the end would be all sums."""
         if self.checkpoint is not None or self.size.speed is None or len(self.piles) > FEW:
             return False
         left = self.missing.left + sum(end - first for first, end, _ in self.running.values())
@@ -292,7 +292,7 @@ class Work:
         while self.coming is not None or self.piles:
             if self.coming is None:
                 self.merge()
-            # result() waits in a way that Ctrl-C can end; its error is told by take_in.
+            # result() waits in a way that Ctrl-C can end; take_in reports its error.
             self.coming.exception()
             self.take_in()
 

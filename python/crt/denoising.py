@@ -120,7 +120,7 @@ def filtered(developed, guides):
 
 
 def mark_of(path):
-    """What a file says of how it was denoised; None where it is no denoised image."""
+    """The metadata of a denoised file; None if it is not a denoised image."""
     try:
         if path.suffix == ".png":
             return texts(path.read_bytes()).get(MARK)

@@ -7,7 +7,7 @@
     result = crt.distributed.render("scene.yaml", client, spp=4096, checkpoint="scene.crtfilm")
 
 Any cluster of Dask serves: local, SSH, Slurm, Kubernetes (docs/cluster.md). The film has the bits of one
-render of all samples, whoever rendered which.
+render of all samples, independent of the distribution over workers.
 """
 
 import signal
@@ -47,18 +47,18 @@ def render(scene, client=None, *, spp=None, seed=None, parts=None, backend="auto
     spp               samples a pixel, those of a checkpoint included; the scene's number when None and
                       neither time nor error ends the render
     seed              of the random numbers; the scene's sampler.seed when None
-    parts             so many, of equal size; of a size that follows the workers' speed when None
+parts this number of parts, of equal size; of a size that follows the workers' speed when None
     backend, devices, threads   as crt.render takes them, on each worker and for each of its threads
     target_error      stop at this half-width of the error, relative to the mean luminance, in (0, 1). It is
                       looked at when the number of samples has doubled, of all pixels and of the even and the
                       odd ones, as `crt render` does (docs/error.md)
-    time_limit        stop after so many seconds; parts that run then end early, and count
+time_limit stop after this number of seconds; parts that run then end early, and count
     checkpoint        path of a .crtfilm: what there is comes into it every `checkpoint_every` seconds, and
                       at the end. Where it exists, only what it lacks is rendered
     checkpoint_every  seconds; more where parts or films are so large that it would cost much
     progress          a bar by tqdm, as of crt.render
     on_progress       called after each part with a dict: samples, samples_wanted, seconds, fraction,
-                      parts, threads, relative_error. What it raises ends the render
+parts, threads, relative_error. An exception that it raises ends the render
 
     Workers may come and go. Parts that a worker takes along are rendered again. A worker whose device fails
     gets no more parts, and the others do its part; the third failure of a part ends the render. Ctrl-C ends
@@ -157,7 +157,7 @@ def carried_on(work, interrupt, target_error, time_limit, tell):
 
 
 class Look:
-    """When the error is looked at, and whether it is small enough: whoever looks all the time stops at the
+    """Decides when to check the error, and if it is small enough: continuous checks stop at the
     luckiest moment."""
 
     FIRST = 64
@@ -175,7 +175,7 @@ class Look:
         return 2 * self.next if self.due(samples) else self.next
 
     def reached(self, work):
-        """Of what has just been merged."""
+        """For the film that has just been merged."""
         if work.kept.samples < self.next:
             return False  # It was merged for a checkpoint.
         while self.next <= work.kept.samples:
@@ -184,7 +184,7 @@ class Look:
 
 
 def told(work, wanted, time_limit):
-    """What on_progress hears."""
+    """The values that on_progress receives."""
     seconds = time.monotonic() - work.began
     fraction = work.samples / wanted
     if time_limit is not None:

@@ -1,10 +1,10 @@
-"""What crt raises."""
+"""The exceptions of crt."""
 
 import enum
 
 
 class Kind(enum.IntEnum):
-    """Whose fault an error is; the values are the exit codes of the program crt."""
+    """Cause of an error; the values are the exit codes of the program crt."""
 
     INTERNAL = 1
     USAGE = 2
@@ -15,7 +15,7 @@ class Kind(enum.IntEnum):
 
 
 class Error(Exception):
-    """What crt says; of a scene with several errors, all of them, each with file, line and column.
+    """The message; of a scene with several errors, all of them, each with file, line and column.
 
     `kind` is a Kind. `file`, `line` and `column` are the place of the first error; `file` is None where
     there is no place, `line` and `column` count from 1 and are None where they are not known.

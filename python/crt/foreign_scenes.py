@@ -8,14 +8,14 @@ import tempfile
 
 from .importers import command, is_foreign
 
-# Ends when whoever holds the other end of its input has ended, however that was, and removes the folder.
+# Waits until the process at the other end of its input has ended in any way, and removes the folder.
 CLEANER = "import shutil, sys; sys.stdin.read(); shutil.rmtree(sys.argv[1], ignore_errors=True)"
 
 
 def with_imported(arguments):
     """The arguments with a scene of another renderer, at their beginning or behind a command, as a scene of
     crt: imported into a folder that is removed when this process, or the program that takes its place, ends.
-    Where there is none they are what they were. Raises crt.Error as import_scene."""
+Without one they stay as they were. Raises crt.Error as import_scene."""
     at = 0 if arguments[:1] and os.path.isfile(arguments[0]) else 1
     if len(arguments) <= at or not is_foreign(arguments[at]) or not os.path.isfile(arguments[at]):
         return arguments

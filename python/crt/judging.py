@@ -1,5 +1,5 @@
-"""Judgements: are two images the same, how large is the error after so many seconds, does a backend find
-what is known? The program crt judges; its figures come back as dicts."""
+"""Judgements: are two images the same, how large is the error after a given time, does a backend reproduce
+known results? The program crt judges; its figures come back as dicts."""
 
 import contextlib
 import json
@@ -15,7 +15,7 @@ DIFFER = 7
 
 
 class Judgement:
-    """What crt found.
+    """The result of a check.
 
     passed   whether the exit code of the program would be 0
     figures  everything in numbers, a dict; its keys are those of the JSON that the program writes
@@ -42,7 +42,7 @@ def compare(a, b, *, tolerance=0.0, all_channels=False):
     tolerance     root mean square difference, as a share of b's mean, that counts as equal; 0: the same bits
     all_channels  every channel, not only R, G and B
 
-    Returns a Judgement; `figures` has the differing pixels, the metrics and, where an image knows its noise,
+Returns a Judgement; `figures` has the differing pixels, the metrics and, if an image states its noise,
     whether the difference is noise or bias. Raises crt.Error for files that are no images.
     """
     with tempfile.TemporaryDirectory(prefix="crt-compare-") as folder:

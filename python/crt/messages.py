@@ -1,4 +1,5 @@
-"""What libcrt says goes to the logger `crt`, which shows warnings and errors unless it is told otherwise."""
+"""The messages of libcrt go to the logger `crt`, which shows warnings and errors unless it is configured
+otherwise."""
 
 import logging
 

@@ -22,7 +22,7 @@ def folder_for(pixels):
 
 
 def film_bytes(film):
-    """What film.save would write."""
+    """The bytes that film.save would write."""
     with tempfile.TemporaryDirectory(dir=folder_for(film.width * film.height), prefix="crt-film-") as folder:
         path = os.path.join(folder, "a.crtfilm")
         film.save(path)

@@ -31,7 +31,7 @@ def file_argument(path):
 
 def run(arguments, *, answers=(0,)):
     """Runs `crt ARGUMENTS` and returns its exit code and what it printed. Codes beside `answers` raise
-    crt.Error with the program's own sentences. What it says meanwhile goes to the logger `crt`. Ctrl-C ends
+crt.Error with the program's own sentences. Its messages go to the logger `crt`. Ctrl-C ends
     it as it does in a terminal, and is raised once it has written what it has."""
     process = subprocess.Popen([path(), *map(str, arguments)], stdin=subprocess.DEVNULL,
                                stdout=subprocess.PIPE, stderr=subprocess.PIPE, encoding="utf-8",

@@ -15,7 +15,7 @@ from .scenes import Scene, load, scene as scene_of
 
 
 class Result:
-    """What a render gives.
+    """The result of a render.
 
     film     crt.Film: sums of samples; films of one scene add
     stop     why sampling ended: "samples", "time", "target" (error), "interrupted" (Ctrl-C), or "stopped"
@@ -65,7 +65,7 @@ class Result:
                 f"{known}, ended by {self.stop}>")
 
 
-# These come with every plane of noise, and are channels of their own in an EXR.
+# These come with every plane of noise, and are separate channels in an EXR.
 BESIDE_NOISE = ("HalfWidth95.Y", "OwnVariance.Y")
 
 
@@ -94,7 +94,7 @@ def render(scene, *, spp=None, seed=None, backend="auto", devices=None, threads=
     devices        an index, a list of indices, a part of a device's name, or "all"; the best when None
     threads        of the host; 0: all. Never changes the image
     target_error   stop at this half-width of the error, relative to the mean luminance, in (0, 1)
-    time_limit     stop after so many seconds
+time_limit stop after this number of seconds
     sample_range   (first, end): exactly these samples, for renders in parts
     resume         an earlier film of the scene, whose samples are not rendered again
     progress       a bar by tqdm. None: where tqdm is installed, and stderr is a terminal or this a notebook
@@ -148,12 +148,12 @@ class Session:
     """
 
     def __init__(self, scene, *, seed=None):
-        self.scene = with_seed(as_scene(scene), seed)  # Which keeps the files of its arrays.
+        self.scene = with_seed(as_scene(scene), seed)  # It keeps the files of its arrays.
         self._native = _crt.Session(self.scene.native)
         self._lock = threading.Lock()
 
     def render(self, **options):
-        """What crt.render does, with its options. Raises crt.Error of kind USAGE when the session is
+        """Does the same as crt.render, with its options. Raises crt.Error of kind USAGE when the session is
         closed."""
         return render(self, **options)
 

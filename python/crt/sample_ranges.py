@@ -1,4 +1,4 @@
-"""Which samples of a render are still to be done, in parts of a wanted size."""
+"""Keeps the samples of a render that are still to be done, in parts of a wanted size."""
 
 ENDLESS = 1 << 31  # Of a render that time or error ends.
 STEP = 16  # Samples take turns between 16 sequences at most: parts of whole turns leave them equally full.
@@ -27,7 +27,7 @@ class Missing:
             self.gaps.sort()
 
     def take(self, samples):
-        """(first, end) of the next part, of about so many samples; None where nothing is left."""
+        """(first, end) of the next part, of about this number of samples; None if nothing is left."""
         if not self.gaps:
             return None
         first, end = self.gaps.pop(0)
@@ -38,15 +38,15 @@ class Missing:
 
 
 class PartSize:
-    """How many samples the next part has: so many that it takes `seconds`, by the speed of earlier ones;
+    """Number of samples of the next part: as many as take `seconds`, by the speed of earlier ones;
     fewer to begin with and towards the end, so that all workers end together.
 
     `fixed` samples instead, where that is given.
     """
 
     FEWEST = 2
-    # From part to part at most. What a short part wastes makes workers look slower than they are: the next
-    # part gets shorter than wanted, not longer.
+    # From part to part at most. The overhead of a short part makes workers look slower than they are: the
+    # next part gets shorter than wanted, not longer.
     GROWTH = 64
 
     def __init__(self, fixed=None):
@@ -55,23 +55,25 @@ class PartSize:
         self.largest = STEP
 
     def learn(self, samples, seconds):
-        """A part of so many samples took so long."""
+        """Records the time of a part with this number of samples."""
         speed = samples / max(seconds, 1e-3)
         self.speed = speed if self.speed is None else 0.7 * self.speed + 0.3 * speed
         self.largest = max(self.largest, self.GROWTH * samples)
 
     def is_known(self, seconds):
-        """Whether parts may have the size that takes so long, not only a few times that of earlier ones."""
+        """True if parts may have the size that takes this time, not only a few times that of earlier
+        ones."""
         return self.fixed is not None or (self.speed is not None and self.largest >= self.speed * seconds)
 
     def shrinks(self, seconds, left, threads):
-        """Whether the end is so near that parts get shorter than `seconds`, or, of a fixed size, that each
+        """True if the end is so near that parts get shorter than `seconds`, or, of a fixed size, that each
         thread gets two more at most."""
         wanted = self.fixed if self.fixed is not None else (self.speed or 0) * seconds
         return left / (2 * max(threads, 1)) < wanted
 
     def next(self, seconds, least, left, threads):
-        """`left` samples are to be shared by so many threads, in parts of at least so many seconds."""
+        """Shares `left` samples between this number of threads, in parts of at least this number of
+        seconds."""
         if self.fixed is not None:
             return self.fixed
         share = left / (2 * max(threads, 1))

@@ -24,7 +24,7 @@ class Scene:
     crt reads the scene, and raises its errors, when you first render it or ask for anything, and again after
     a key was set.
 
-    `copy()`, copy.copy and copy.deepcopy give a scene of its own. A scene pickles: of a file its path, for
+`copy()`, copy.copy and copy.deepcopy give a separate scene. A scene pickles: of a file its path, for
     machines that share the file; of text or a dict all of it. Files that the text names are looked up where
     it is unpickled.
     """
@@ -214,7 +214,7 @@ def fresh(value):
 
 def with_paths(value, files):
     """A copy of `value` in which those texts that are among `files` are paths. Meshes stay the same objects,
-    by which arrays are told apart."""
+which identifies arrays."""
     if isinstance(value, dict):
         return {key: inner if key == "mesh" else with_paths(inner, files) for key, inner in value.items()}
     if isinstance(value, list):

@@ -1,4 +1,4 @@
-/// What the parts of the module `crt._crt` share.
+/// The shared parts of the module `crt._crt`.
 #pragma once
 
 #include <crt/crt.h>

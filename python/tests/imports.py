@@ -54,6 +54,6 @@ def pfm(pixels):
 
 
 def whats(path):
-    """Of what an import lists: what it is, by its place."""
+    """The entries of an import: each by its place."""
     return {f"{loss.first.line}": (loss.what, loss.instead, loss.count)
             for loss in crt.import_scene(path).losses}

@@ -1,4 +1,5 @@
-"""A Slurm of one node on loopback, with daemons, key, ports and folders of its own, which all go with it.
+"""A Slurm of one node on loopback, with separate daemons, key, ports and folders, which it removes at its
+end.
 
 It needs no systemd and no rights beyond those of its user; as root the daemons run as root.
 """
@@ -120,7 +121,7 @@ class Slurm:
                 stdout=log, stderr=subprocess.STDOUT, start_new_session=True, cwd=self.folder)))
 
     def run(self, *words, check=True):
-        """What the program printed."""
+        """The output of the program."""
         done = subprocess.run([str(word) for word in words], env=self.environment, capture_output=True,
                               text=True, timeout=900)
         assert not check or done.returncode == 0, f"{words}: {done.stderr}"

@@ -74,7 +74,7 @@ def test_scenes_pickle(tmp_path, monkeypatch):
         monkeypatch.chdir(tmp_path)
         sent = pickle.dumps(scene)
         film = crt.render(scene, spp=2, backend="embree").film
-        monkeypatch.chdir("/")  # Where a worker stands is chance.
+        monkeypatch.chdir("/")  # The progress of a worker is random.
         again = pickle.loads(sent)
         assert again.overrides == scene.overrides and (again.width, again.height) == (20, 12)
         assert same(crt.render(again, spp=2, backend="embree").film.xyz, film.xyz)

@@ -181,7 +181,8 @@ def test_materials_become_those_of_crt(tmp_path):
 
 
 def test_plastic_without_nonlinear_has_the_albedo_of_mitsubas(tmp_path):
-    """What the coat lets out of crt's base and of Mitsuba's is the same after all rounds below it."""
+    """The light that the coat transmits from crt's base and from Mitsuba's is the same after all rounds
+    below it."""
     from crt.importers.mitsuba_materials import inner_reflectance
     inner = inner_reflectance(1.5)
     near(inner, 0.5964, 1e-3)  # Of index 1.5, as tables have it.

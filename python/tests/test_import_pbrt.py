@@ -39,7 +39,7 @@ def luminance(image):
 
 
 def material(folder, text):
-    """What a sphere of this material is made of."""
+    """The material of a sphere of this kind."""
     content = crt.import_scene(scene(folder, text + '\nShape "sphere"')).content
     return content["materials"][content["objects"][0]["material"]]
 

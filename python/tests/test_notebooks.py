@@ -7,7 +7,7 @@ import sys
 import pytest
 
 NOTEBOOKS = pathlib.Path(__file__).resolve().parents[2] / "docs/notebooks"
-# What must hold of the variables that a notebook leaves, as Python in its own kernel.
+# Conditions on the variables that a notebook leaves, as Python in its own kernel.
 CLAIMS = {
     "1_first_picture": ["red_is_left is True", "resumed_is_the_same is True", "read.samples == 4 * SPP",
                         "image.shape == (SIZE, SIZE, 3)", "0.05 < image.mean() < 0.3"],

@@ -208,7 +208,7 @@ def test_interrupt_keeps_the_film(tmp_path):
 
 
 def test_interrupt_within_a_function_of_python(box):
-    """Where Ctrl-C finds the interpreter is chance: here it is in the function that hears of progress."""
+    """Ctrl-C finds the interpreter at a random place: here it is in the function that receives progress."""
     def interrupt(now):
         raise KeyboardInterrupt
 

@@ -1,5 +1,5 @@
-"""Pages of `python -m crt report`: what the JSON of a run says stands in its page, the page asks for nothing
-from outside, and of a folder that is no run no page is begun."""
+"""Pages of `python -m crt report`: the page shows the data in the JSON of a run, it has no external
+resources, and for a folder without a run no page is begun."""
 
 import json
 import os
@@ -252,7 +252,7 @@ def test_markup_in_what_a_run_says_is_text(run, request, edited):
     assert "<script" not in page.source
 
 
-# What must stay as it is for the page to be of a run at all.
+# The parts that a valid page of a run must have.
 KEPT = {"format", "verdict", "file", "id", "tone", "kind", "colours"}
 
 
@@ -412,7 +412,7 @@ def test_where_python_cannot_the_program_says_the_command(tmp_path):
         assert (folder / "verify.json").exists()
         typed = re.search(r"this command makes it: (.*)$", done.stdout, re.MULTILINE)[1]
         assert typed.endswith(f"share/crt/report '{folder}'")
-    # What it says works.
+    # The command that it prints works.
     said = typed.replace("/bin/false", sys.executable)
     subprocess.run(["sh", "-c", said], check=True, capture_output=True)
     assert (folder / "verify.html").exists()

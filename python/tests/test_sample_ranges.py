@@ -1,4 +1,4 @@
-"""Which samples are left, and how large parts are."""
+"""The samples that are left, and the sizes of parts."""
 
 import random
 

@@ -40,7 +40,7 @@ outputs: [{file: picture.png}]
 
 @pytest.fixture
 def files(tmp_path):
-    """A scene that includes another in a folder of its own, each with files beside it."""
+    """A scene that includes one from another folder, each with files next to it."""
     parts = tmp_path / "parts"
     parts.mkdir()
     (parts / "room.yaml").write_text(ROOM)

@@ -174,7 +174,7 @@ def test_real_slurm(folder):
         assert not (folder / "my image.exr").exists()
         assert "resuming" in (folder / "my box.slurm/logs/5.log").read_text()
 
-        # What is missing, from where it was, and the merge.
+        # The missing parts, each from its last sample, and the merge.
         kept = crt.Film.load(str(parts / "3.crtfilm")).samples
         again = subprocess.run([folder / "my box.slurm/submit.sh"], env=cluster.environment, text=True,
                                capture_output=True)

@@ -12,7 +12,7 @@ SAMPLES = 512   # Of a pixel, at most.
 
 
 def about(text):
-    """What the comment at the top of a scene says: its first paragraphs, and what to look for."""
+    """The comment at the top of a scene: its first paragraphs, and hints for the viewer."""
     comment = re.match(r"(?:#.*\n)+", text)[0]
     paragraphs = "\n".join(line[1:].removeprefix(" ") for line in comment.splitlines()).split("\n\n")
     kept = [" ".join(p.split()) for p in paragraphs if not p.startswith(" ")]

@@ -34,7 +34,7 @@ def title(text):
 
 
 def package(build, work):
-    """The package crt in a folder of its own: this tree's files in Python, and the module that was built."""
+    """The package crt in a separate folder: this tree's files in Python, and the module that was built."""
     folder = work / "python/crt"
     shutil.rmtree(folder, ignore_errors=True)
     shutil.copytree(ROOT / "python/crt", folder, ignore=shutil.ignore_patterns("__pycache__"))

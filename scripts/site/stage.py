@@ -32,7 +32,7 @@ class Stage:
         self.shown = set()
 
     def page_of(self, place):
-        """Where the site shows a file or folder of the repository: a path relative to `docs`."""
+        """The place of a file or folder of the repository on the site: a path relative to `docs`."""
         name = place.relative_to(ROOT).as_posix()
         if name in PAGES:
             return PAGES[name]

@@ -1,5 +1,5 @@
-"""What the tests of the program from outside share: the program, a folder of its own for each test, and how
-to run it there.
+"""The shared parts of the tests of the program from outside: the program, a separate folder for each test,
+and a way to run it there.
 
 Each of them is started as
 
@@ -53,8 +53,8 @@ def environment(**changes):
     """That of a test's crt: this process's without CRT_ variables, with `changes`; None removes one."""
     env = {k: v for k, v in os.environ.items() if not k.startswith("CRT_")}
     env["CRT_BACKEND_PATH"] = FAKE_DIR
-    # Addresses compiled in by a sanitizer build need no help from here; a cache in the home of whoever runs
-    # the tests does no good.
+    # Addresses compiled in by a sanitizer build need no help from here; a cache in the home of the user who
+    # runs the tests is harmful.
     env["CRT_CACHE_DIR"] = os.path.join(tempfile.gettempdir(), f"crt-test-cache-{os.getuid()}")
     env["CRT_PYTHON"] = ""  # Pages need libraries that not every Python has: tests of them ask for one.
     env.update(changes)
@@ -102,7 +102,7 @@ def first_real_backend():
 
 
 def can_mount():
-    """Whether this process may mount a disk, which root in a container may not."""
+    """True if this process may mount a disk, which root in a container may not."""
     if os.geteuid() != 0 or shutil.which("mount") is None:
         return False
     probe = "/tmp/crt-mount-probe"

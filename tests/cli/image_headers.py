@@ -1,4 +1,4 @@
-"""What stands in the headers of EXR and PNG files, read without any image library."""
+"""Reads the headers of EXR and PNG files without any image library."""
 
 import struct
 import zlib

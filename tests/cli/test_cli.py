@@ -223,10 +223,10 @@ class Info(CliTest):
         self.assertIn(self.report("a.report.json")["scene"]["hash"], self.crt("info", "scene.yaml").stdout)
 
     def test_a_scene_needs_no_backend_and_no_image_library(self):
-        # What makes a start slow is libraries; the dynamic linker tells which are opened.
+        # Libraries make a start slow; the dynamic linker tells which are opened.
         def libraries(*arguments):
             return self.crt(*arguments, LD_DEBUG="files").stderr
-        # What would be opened would be seen.
+        # The trace would show every library that is opened.
         self.assertIn("crt_backend_fake.so", libraries("scene.yaml", "-b", "fake", "-o", "a.exr"))
         self.assertIn("libOpenImageIO", libraries("info", "a.exr"))
         opened = libraries("info", "scene.yaml")

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What the table of commands becomes (help, manual page, completion), named data, and standard streams.
+"""The results of the table of commands (help, manual page, completion), named data, and standard streams.
 
     test_commands.py CRT CONFIG_DIR FAKE_PLUGIN_DIR [unittest arguments]
 """
@@ -69,7 +69,7 @@ class Completion(CliTest):
         os.mkdir(self.path("folder"))
 
     def bash(self, *words):
-        """What bash offers at the end of these words."""
+        """The completions of bash at the end of these words."""
         program = self.script + (
             'COMP_WORDS=("$@"); COMP_CWORD=$(($# - 1)); _crt; printf "%s\\n" "${COMPREPLY[@]}"'
         )
@@ -356,7 +356,7 @@ class StandardStreams(CliTest):
         self.crt("scene.yaml", "--backend", "fake", "--report", "none", "-o", "a.pfm")
         self.assertEqual(run.stdout, read_bytes(self.path("a.pfm")))
         self.assertIn(b"2 objects", self.stream("info", "-", stdin=scene).stdout)
-        # What it includes lies beside the working directory.
+        # The included file lies next to the working directory.
         self.write("room.yaml", harness.SCENE)
         run = self.stream("info", "-", stdin=b"crt: 1\ninclude: room.yaml\n")
         self.assertIn(b"2 objects", run.stdout)

@@ -120,7 +120,7 @@ class Converging(LightTest):
                 run = self.converge("scene.yaml", *changed, "--resume", expect=2)
                 self.assert_one_error(run, "a different experiment", what)
         self.assertEqual(self.rows("out"), before)
-        # What is measured is scene radiance, whatever a screen is shown.
+        # The measured quantity is scene radiance, independent of the display.
         self.converge(
             "scene.yaml", *SMALL, "--set", "film.exposure_ev=1", "--set", "film.white_balance=A", "--resume"
         )
@@ -207,7 +207,7 @@ class Converging(LightTest):
             ("film.resolution=[8,8]", "the resolution is 16 × 16, not 8 × 8"),
             ("integrator.max_depth=3", "max_depth is 16, not 3"),
             ("camera.fov=20", "the camera is at"),
-            ("materials.floor.reflectance=0.2", "the materials are others"),
+            ("materials.floor.reflectance=0.2", "the materials differ"),
         ):
             with self.subTest(change=change):
                 run = self.converge(

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What happens to the program from outside: killed at any moment, disks that fill up or turn read-only,
+"""Outside events and the program: killed at any moment, disks that fill up or turn read-only,
 backends that hang or lie, and storms of signals. Always the same demand: what was saved
 stays, and the exit code and one sentence say what happened (docs/architecture.md).
 

@@ -250,7 +250,7 @@ class Merging(CliTest):
 
 
 class Developing(CliTest):
-    """What a film says of its scene is enough to make every image of it again."""
+    """A film's record of its scene is enough to make every image of it again."""
 
     def setUp(self):
         super().setUp()
@@ -487,7 +487,7 @@ class FloatFiles(CliTest):
         for ev in "0", "1":
             self.crt(*render, "-o", ev + ".exr", "--set", "film.exposure_ev=" + ev)
             self.crt(*render, "-o", ev + "_other.exr", "--set", "film.exposure_ev=" + ev, "--seed", "5")
-        # What noise compare sees does not depend on the exposure of both.
+        # The noise that compare sees does not depend on the exposure of both.
         seen = [
             json.loads(self.crt("compare", e + ".exr", e + "_other.exr", "--json", expect=7).stdout)
             for e in "01"

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What someone meets who is new: versions, names of other programs' things, pictures that are too bright or
+"""First experiences of a new user: versions, names from other programs, images that are overexposed or
 black, exposures, units, and scenes of other renderers.
 
     test_first_steps.py CRT CONFIG_DIR FAKE_PLUGIN_DIR [unittest arguments]
@@ -85,10 +85,10 @@ class Exposure(CliTest):
             exposure = f"film.exposure_ev={stops}"
             return self.crt("lit.yaml", "-b", "fake", "-o", "a.png", "--set", exposure).stderr
 
-        said = re.search(r"warning: 'a.png': .* about ([\d.]+) stops less of film.exposure_ev", render(6))
+        said = re.search(r"warning: 'a.png': .* reduce film.exposure_ev by about ([\d.]+) stops", render(6))
         self.assertTrue(said)
-        self.assertNotIn("too bright", render(6 - float(said[1])))
-        self.assertIn("too bright", render(6 - float(said[1]) + 1))
+        self.assertNotIn("overexposed", render(6 - float(said[1])))
+        self.assertIn("overexposed", render(6 - float(said[1]) + 1))
 
     def test_auto_is_an_exposure_that_can_be_written_down(self):
         run = self.crt("lit.yaml", "-b", "fake", "-o", "a.ppm", "-o", "a.pfm", "-o", "a.crtfilm", "--expose",
@@ -102,7 +102,7 @@ class Exposure(CliTest):
         self.assertAlmostEqual(float(exposure), math.log2(0.18) - sum(logs) / len(logs), delta=0.011)
         self.crt("lit.yaml", "-b", "fake", "-o", "b.ppm", "--set", "film.exposure_ev=" + exposure)
         self.assertEqual(self.bytes("a.ppm"), self.bytes("b.ppm"))
-        # The film knows it, and develop chooses the same.
+        # The film stores it, and develop chooses the same.
         self.assertIn(f"exposure {float(exposure):+g} EV", self.crt("info", "a.crtfilm").stdout)
         self.crt("develop", "a.crtfilm", "-o", "c.ppm", "--expose", "auto", "--set", "film.exposure_ev=1")
         self.assertEqual(self.bytes("a.ppm"), self.bytes("c.ppm"))
@@ -155,7 +155,7 @@ class OtherRenderers(CliTest):
         self.write("other.xml", "<scene/>")
 
     def python(self, looks):
-        """Whose first call, which looks for the package, ends with this code."""
+        """An interpreter whose first call, which looks for the package, ends with this code."""
         path = self.path("python")
         with open(path, "w", encoding="utf-8") as file:
             file.write(f'#!/bin/sh\nif [ $# = 2 ]; then exit {looks}; fi\n'

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""What happens to a GPU: too little memory for film, scene or kernels, a device that is lost, and a cache of
-kernels that is damaged, somebody else's, on a full disk or in use by several processes. Always the same
+"""Faults of a GPU: too little memory for film, scene or kernels, a lost device, and a cache of kernels that
+is damaged, owned by another user, on a full disk or in use by several processes. Always the same
 demand: the bits of an undisturbed render, or one sentence and the exit code of docs/architecture.md.
 
     test_gpu_faults.py CRT CONFIG_DIR FAKE_PLUGIN_DIR [unittest arguments]
@@ -114,7 +114,7 @@ class LostGpu(FakeGpuTest):
 
 
 class Waves(FakeGpuTest):
-    """A scene that is rendered by kernels of their own for tracing and shading. The least memory is that of
+    """A scene that is rendered by separate kernels for tracing and shading. The least memory is that of
     film, scene and counters: what a render without waves takes, as an image without sample slices shows."""
 
     def setUp(self):
@@ -310,7 +310,8 @@ class LittleOpenClMemory(CliTest):
 
 
 class KernelCaches(FakeGpuTest):
-    """What was cached is gone, damaged or not ours: kernels are compiled again, and nothing else differs."""
+    """The cached kernels are gone, damaged or foreign: kernels are compiled again, and nothing else
+    differs."""
 
     LEAN = ["--kernel", "lean-only"]
 

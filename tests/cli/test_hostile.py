@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What must not be able to harm crt: inputs and faults, each with what happens. Always the same
+"""Inputs and faults that must not be able to harm crt, each with its outcome. Always the same
 demand: an exit code of the documented ones and the right one, a message that says why, no crash, no hang, no
 memory that the input does not account for, and every file that was there still there.
 
@@ -79,7 +79,7 @@ class Case:
 
 
 class Folder:
-    """Where one case runs."""
+    """The folder of one case."""
 
     def __init__(self, path):
         self.path = path
@@ -519,7 +519,7 @@ def scene_cases():
         + MATERIALS
         + f"objects:\n- &o {{{TRIANGLE}, material: m, transforms: [&p {placement}{', *p' * 9999}]}}\n"
         + "- *o\n" * 1000,
-        words=("values behind aliases, which take", "CRT_SCENE_MEMORY="),
+        words=("values behind aliases, which need", "CRT_SCENE_MEMORY="),
     )
     placement = "[]"  # A single value, so that there may be more of them.
     scene(
@@ -528,7 +528,7 @@ def scene_cases():
         + MATERIALS
         + f"objects:\n- &o {{{TRIANGLE}, material: m, transforms: [&p {placement}{', *p' * 9999}]}}\n"
         + "- *o\n" * 1000,
-        words=("placements, which take", "CRT_SCENE_MEMORY="),
+        words=("placements, which need", "CRT_SCENE_MEMORY="),
     )
     scene(
         "the same behind 500, allowed but for its triangles",
@@ -536,7 +536,7 @@ def scene_cases():
         + MATERIALS
         + f"objects:\n- &o {{{TRIANGLE}, material: m, transforms: [&p {placement}{', *p' * 9999}]}}\n"
         + "- *o\n" * 500,
-        words=("triangles, which take", "CRT_SCENE_MEMORY="),
+        words=("triangles, which need", "CRT_SCENE_MEMORY="),
     )
     scene(
         "a face of 5,000 corners behind 20,000 aliases (167 kB)",
@@ -1793,7 +1793,7 @@ def large_film(samples):
 # running
 
 def descriptor_for(place, read_side):
-    """What a standard stream is opened on; None is closed."""
+    """The file on which a standard stream is opened; None is closed."""
     if place == "closed":
         return None
     if place == "broken":  # A pipe whose reader has gone.
@@ -1863,7 +1863,7 @@ def text_of(captured):
 
 
 def run(case_, number):
-    """What happened, and what of it is wrong."""
+    """The outcome, and the errors in it."""
     folder = Folder(os.path.join(WORK, f"case{number}"))
     os.mkdir(folder.path, 0o755)
     if case_.prepare:

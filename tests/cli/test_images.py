@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""What image files say of themselves: colour tags, dates, windows, matrices. Headers are read here, not by
-the library that wrote them.
+"""Metadata of image files: colour tags, dates, windows, matrices. Headers are read here, not by the library
+that wrote them.
 
     test_images.py CRT CONFIG_DIR FAKE_PLUGIN_DIR [unittest arguments]
 

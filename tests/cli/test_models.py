@@ -152,8 +152,7 @@ class Meshes(CliTest):
         said = self.render("mtllib lost.mtl\n" + SQUARE + "usemtl red\nf 1 2 3 4\n", keys="", expect=3)
         self.assertIn(
             "mesh.yaml:5:17: error: 2 of 2 triangles of object 0 have no material (the OBJ refers to "
-            "'lost.mtl', which does not exist); "
-            "give them one with 'material: NAME'",
+            "'lost.mtl', which does not exist); give them one with 'material: NAME'",
             said,
         )
         self.assertIn("for instance 'material: grey'", said)
@@ -163,8 +162,7 @@ class Meshes(CliTest):
         said = self.render("mtllib lost.mtl\n" + SQUARE + "usemtl red\nf 1 2 3 4\n")
         self.assertIn(
             "warning: mesh.obj: material 'red' is not defined, and the file 'lost.mtl' does not exist: 2 of "
-            "2 "
-            "triangles have no material",
+            "2 triangles have no material",
             said,
         )
 

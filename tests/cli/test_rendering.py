@@ -459,7 +459,8 @@ class Light(LightTest):
             "scene.yaml", "-b", self.backend, "-o", "a.png", "-o", "a.exr", "--set", "film.exposure_ev=-30"
         )
         self.assertNotIn("no path met", run.stderr)
-        stops = int(re.search(r"'a.png' is black: .* about (\d+) stops more", run.stderr).group(1))
+        stops = int(re.search(r"'a.png' is black: .*increase film.exposure_ev by about (\d+) "
+                              r"stops", run.stderr).group(1))
         self.assertNotIn(
             "black",
             self.crt(

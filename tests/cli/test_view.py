@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""`crt view` as its pages see it: the picture and what changes it, files that change, errors, and who is let
-in. What a browser makes of it is asked by tests/view/test_page.py.
+"""`crt view` as its pages see it: the picture and what changes it, files that change, errors, and access
+control. tests/view/test_page.py tests the page in a browser.
 
     test_view.py CRT CONFIG_DIR FAKE_PLUGIN_DIR [unittest arguments]
 """
@@ -67,7 +67,7 @@ class Picture(CliTest):
             with refused.exception as reply:
                 self.assertEqual(reply.code, 400)
                 self.assertIn(words, reply.read().decode())
-        after, _ = view.sight()
+        after, _ = view.state()
         for key in ("white", "plane", "exposure_ev", "camera"):
             self.assertEqual(after[key], before[key])
 
@@ -275,15 +275,15 @@ class Access(CliTest):
             connection.close()
 
     def test_silent_connections_lock_nobody_out(self):
-        """Whoever has the token is answered while they are there, and not once they have ended."""
+        """Requests with the token are answered during the run, and not after its end."""
         for limit, most in ((None, 256), (64, 8)):
             view = View(self, "-b", "fake", most_descriptors=limit)
             view.wait_until_done()
             before, threads = harness.processor_seconds(view.process), self.threads_of(view)
             silent = [socket.create_connection(("127.0.0.1", view.port), 30) for _ in range(500)]
             for _ in range(5):
-                view.sight()
-            # The server has room for so many: the oldest gave way to those that came later.
+                view.state()
+            # The server has room for this number: the oldest gave way to those that came later.
             self.assertIn(sum(is_open(connection) for connection in silent), range(most // 2, most + 1))
             self.assertTrue(is_open(silent[-1]))
             # Those that only connect cost no threads, and nothing while they are silent.
@@ -291,7 +291,7 @@ class Access(CliTest):
             self.assertLess(harness.processor_seconds(view.process) - before, 3)
             for connection in silent:
                 connection.close()
-            view.sight()
+            view.state()
             self.assertIsNone(view.process.poll())
             view.process.kill()
 
@@ -309,7 +309,7 @@ class Access(CliTest):
             with refused.exception as reply:
                 self.assertIn("no farther", reply.read().decode())
             view.change(orbit=[1, 1])
-            self.assertNotIn(None, view.sight()[0]["camera"]["position"])
+            self.assertNotIn(None, view.state()[0]["camera"]["position"])
             view.change(reset_camera=True)
 
     def test_a_port_that_is_taken_is_named(self):
@@ -347,7 +347,7 @@ class End(CliTest):
 
     def wait_in_vain(self, view, version):
         try:
-            view.sight(version)
+            view.state(version)
         except OSError:
             pass
 
@@ -397,7 +397,7 @@ class Tev(CliTest):
 
 
 def is_open(connection):
-    """Whether the other end has neither closed it nor sent anything."""
+    """True if the other end has neither closed it nor sent anything."""
     connection.setblocking(False)
     try:
         connection.recv(1)
@@ -409,7 +409,7 @@ def is_open(connection):
 
 
 def is_newer(status, than):
-    """Whether its picture was made after the other's."""
+    """True if its picture was made after the other's."""
     return status["picture"]["number"] > than["picture"]["number"]
 
 

@@ -42,7 +42,7 @@ class Order(CliTest):
             page.start()
         for page in pages:
             page.join()
-        self.assertEqual(view.sight()[0]["exposure_ev"], self.before["exposure_ev"] + 15)
+        self.assertEqual(view.state()[0]["exposure_ev"], self.before["exposure_ev"] + 15)
 
     def test_what_is_sent_again_counts_once(self):
         view = self.view_of_scene()
@@ -50,20 +50,20 @@ class Order(CliTest):
         view.changes([step, step], page="a", first=1)
         view.changes([step, step, step], page="a", first=1)
         view.changes([step], page="b", first=1)
-        self.assertEqual(view.sight()[0]["exposure_ev"], 4)
+        self.assertEqual(view.state()[0]["exposure_ev"], 4)
         view.changes([step], page="a", first=4)
-        self.assertEqual(view.sight()[0]["exposure_ev"], 5)
+        self.assertEqual(view.state()[0]["exposure_ev"], 5)
 
     def test_changes_are_made_in_their_order(self):
         view = self.view_of_scene()
         view.changes([{"orbit": [1, 0.2]}, {"zoom": 2}, {"reset_camera": True}])
-        self.assertFalse(view.sight()[0]["camera_moved"])
+        self.assertFalse(view.state()[0]["camera_moved"])
         view.changes([{"reset_camera": True}, {"orbit": [1, 0.2]}])
-        self.assertTrue(view.sight()[0]["camera_moved"])
+        self.assertTrue(view.state()[0]["camera_moved"])
         view.changes([{"toggle_paused": True}] * 3)
-        self.assertTrue(view.sight()[0]["paused"])
+        self.assertTrue(view.state()[0]["paused"])
         view.changes([{"exposure_step": 2}, {"exposure_ev": 1}, {"exposure_step": 0.5}])
-        self.assertEqual(view.sight()[0]["exposure_ev"], 1.5)
+        self.assertEqual(view.state()[0]["exposure_ev"], 1.5)
 
     def test_a_refused_change_takes_no_other_with_it(self):
         view = self.view_of_scene()
@@ -71,14 +71,14 @@ class Order(CliTest):
                                    {"exposure_step": 1}], page="a", first=1)
         self.assertIn("dolly", said)
         self.assertIn("pinhole", said)
-        self.assertEqual(view.sight()[0]["exposure_ev"], 2)
+        self.assertEqual(view.state()[0]["exposure_ev"], 2)
         self.assertIn("list", self.refused(view, "none"))
 
     def test_the_reply_names_the_status_that_knows_of_the_change(self):
         view = self.view_of_scene()
         version = view.changes([{"exposure_step": 1}])["version"]
         self.assertGreater(version, self.before["version"])
-        self.assertGreaterEqual(view.sight()[0]["version"], version)
+        self.assertGreaterEqual(view.state()[0]["version"], version)
 
 
 class Angle(LightTest):
@@ -125,7 +125,7 @@ class Shown(LightTest):
         self.assertTrue(0 < part < 1, part)
 
     def test_a_pixel_belongs_to_the_run_of_a_picture(self):
-        run = self.view.sight()[0]["picture"]["run"]
+        run = self.view.state()[0]["picture"]["run"]
         self.assertEqual(self.view.json("/pixel", x=12, y=12)["run"], run)
         self.view.change(orbit=[0.5, 0])
         status, _ = self.view.wait(lambda s: is_done(s) and s["camera_moved"])

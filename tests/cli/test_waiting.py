@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""What people wait for: loading and building say how far they are and can be stopped, times add up, nothing
-is built that is never read, and checkpoints are small and written beside the render.
+"""Waiting times: loading and building report how far they are and can be stopped, times add up, nothing is
+built that is never read, and checkpoints are small and written beside the render.
 
     test_waiting.py CRT CONFIG_DIR FAKE_PLUGIN_DIR [unittest arguments]
 
@@ -73,7 +73,7 @@ class Waiting(CliTest):
         return super().report(name)
 
     def on_terminal(self, *arguments, until, timeout=harness.PATIENCE_SECONDS, **changes):
-        """What a terminal of 100 columns shows until `until` is there; then Ctrl-C. Returns (text, exit
+        """The output of a terminal of 100 columns until `until` is there; then Ctrl-C. Returns (text, exit
         status)."""
         pid, terminal = pty.fork()
         if pid == 0:
@@ -225,7 +225,7 @@ class Waiting(CliTest):
         far = ["--set", "camera.position=[0,100,-400]", "--set", "camera.fov=0.5"]
         self.crt("mesh.yaml", "-b", "embree", "-o", "far.pfm", *far, CRT_BACKEND_PATH="")
         self.assertEqual(self.report("far.report.json")["scene"]["nodes"], 0)
-        # The same films, whoever brings what.
+        # The same films, whatever the backend brings.
         for name, options in (("a", []), ("far", far)):
             self.crt("mesh.yaml", "-b", "example", "-o", f"{name}_example.pfm", *options)
             self.assertGreater(self.report(f"{name}_example.report.json")["scene"]["nodes"], 0)

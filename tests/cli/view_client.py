@@ -35,9 +35,9 @@ class View:
     def json(self, path, **query):
         return json.loads(self.get(path, **query))
 
-    def sight(self, after=0):
+    def state(self, after=0):
         """The status, and the picture's bytes [height][width][4]."""
-        reply = self.get("/sight", after=after, picture=0)
+        reply = self.get("/state", after=after, picture=0)
         (length,) = struct.unpack_from("<I", reply)
         return json.loads(reply[4:4 + length]), reply[4 + length:]
 
@@ -58,13 +58,13 @@ class View:
             return name, reply.read()
 
     def wait(self, condition, what="what was waited for"):
-        """The first sight whose status is as wanted, and its picture."""
+        """The first state whose status is as wanted, and its picture."""
         end = time.monotonic() + PATIENCE_SECONDS
-        status, pixels = self.sight()
+        status, pixels = self.state()
         while not condition(status):
             if time.monotonic() > end:
                 raise AssertionError(f"{what} did not come: {status}")
-            status, pixels = self.sight(status["version"])
+            status, pixels = self.state(status["version"])
         return status, pixels
 
     def wait_until_done(self):
@@ -83,7 +83,7 @@ class View:
 
 
 def is_done(status):
-    """Whether the picture has all samples of the whole film, from where the camera is."""
+    """True if the picture has all samples of the whole film, from the place of the camera."""
     picture = status.get("picture")
     return (bool(picture) and picture["divisor"] == 1 and picture["of_this_camera"]
             and status["samples"] == status["samples_wanted"] and picture["samples"] == status["samples"])

@@ -6,9 +6,9 @@
 // CRT_FAKE_CUDA says what is to go wrong: "no_device", "old" (a driver for CUDA 11), "launch" (every launch
 // fails), "little_memory" (other programs have taken all but a few megabytes) or "overtaken" (they take it
 // after cuMemGetInfo was asked).
-// CRT_FAKE_CUDA_DEVICES: so many devices instead of one.
-// CRT_FAKE_CUDA_MEMORY: so many bytes of each are left by other programs.
-// CRT_FAKE_CUDA_LAUNCH_MEMORY: so many bytes must be free for a launch, as a kernel's local memory is.
+// CRT_FAKE_CUDA_DEVICES: number of devices instead of one.
+// CRT_FAKE_CUDA_MEMORY: bytes of each that other programs leave.
+// CRT_FAKE_CUDA_LAUNCH_MEMORY: bytes that must be free for a launch, as a kernel's local memory is.
 // CRT_FAKE_CUDA_LOST=D:N,…: the N-th launch on device D fails, and whatever is asked of it after that.
 // Devices that are not to be lost launch nothing until it has happened, or all work could be done without D.
 // CRT_FAKE_CUDA_PEAK: a file, to which the most bytes that were ever allocated are written in the end.
@@ -51,7 +51,7 @@ std::size_t number(const char* variable, std::size_t otherwise) {
     return value != nullptr ? std::strtoull(value, nullptr, 10) : otherwise;
 }
 
-/// What this program can have of a device's memory.
+/// The part of a device's memory that this program can have.
 std::size_t ownMemory() {
     return number("CRT_FAKE_CUDA_MEMORY", goesWrong("little_memory") ? std::size_t{8} << 20 : kMemory);
 }
@@ -64,7 +64,7 @@ std::size_t lostAt(int device) {
     return at == std::string::npos ? 0 : std::strtoull(text.c_str() + text.find(':', at) + 1, nullptr, 10);
 }
 
-/// Whether [address, address + bytes) lies in one allocation.
+/// True if [address, address + bytes) lies in one allocation.
 bool isAllocated(CUdeviceptr address, std::size_t bytes) {
     const std::lock_guard<std::mutex> lock(mutex);
     auto next = allocations.upper_bound(address);
@@ -99,7 +99,7 @@ struct LeakCheck {
 
 }  // namespace
 
-// What cuda.h leaves open: an event is when it was recorded, a function its name.
+// Definitions that cuda.h leaves open: an event is the time of its recording, a function its name.
 struct CUevent_st {
     double seconds = 0;
 };
@@ -121,14 +121,14 @@ static CUctx_st contexts[kMostDevices];
 static thread_local CUcontext current = nullptr;
 static std::condition_variable device_lost;
 
-/// Whether a device will be lost that is not yet.
+/// True if a device will be lost that is not yet.
 static bool lossIsAwaited() {
     for (int device = 0; device < kMostDevices; ++device)
         if (lostAt(device) != 0 && !contexts[device].lost) return true;
     return false;
 }
 
-/// What every call says first.
+/// The first message of every call.
 static CUresult stateOfDevice() {
     if (current == nullptr) return CUDA_ERROR_INVALID_CONTEXT;
     const std::lock_guard<std::mutex> lock(mutex);
@@ -273,7 +273,7 @@ CRT_FAKE cuMemAlloc(CUdeviceptr* address, std::size_t bytes) {
     if (bytes > ownMemory() - current->allocated) return CUDA_ERROR_OUT_OF_MEMORY;
     void* memory = std::aligned_alloc(256, (bytes + 255) / 256 * 256);
     if (memory == nullptr) return CUDA_ERROR_OUT_OF_MEMORY;
-    std::memset(memory, 0xcd, bytes);  // whoever relies on cleared memory shall see it
+    std::memset(memory, 0xcd, bytes);  // code that relies on cleared memory shall fail
     *address = reinterpret_cast<CUdeviceptr>(memory);
     allocations[*address] = {bytes, current};
     current->allocated += bytes;

@@ -12,7 +12,7 @@
 //   nan_film, count_film   the film that is handed over holds a NaN, or more samples than were asked for
 //   scene_oom, read   set_scene or read_film fails
 // CRT_FAKE_FAULT_DEVICE: only that device has the fault.
-// CRT_FAKE_MEMORY: so many bytes for film and scene has each device, or with "1000,2000" each its own.
+// CRT_FAKE_MEMORY: bytes for film and scene of each device, or with "1000,2000" each its own.
 // CRT_FAKE_SCENE_SECONDS: so long takes set_scene, which says how far it is.
 // CRT_FAKE_FIRST_START_MS: so long takes the first integrator of a process, as a driver does that is not
 // loaded yet.

@@ -1,4 +1,4 @@
-/// What the backend `fake` renders, so that a test can say what must be in a film without a kernel.
+/// The pattern that the backend `fake` renders, so that a test can predict a film without a kernel.
 #pragma once
 
 #include <cstdint>
@@ -38,7 +38,7 @@ inline std::uint32_t primitiveAt(std::uint32_t x, std::uint32_t y) {
     return x == y ? 0xffffffffu : x + 1000 * y;
 }
 
-/// Which samples are not a number, and so neither summed nor counted, under CRT_FAKE_FAULT=nan.
+/// Samples that are not a number, and so neither summed nor counted, under CRT_FAKE_FAULT=nan.
 inline bool isInvalid(std::uint32_t x, std::uint32_t y, std::uint64_t sample) {
     return (x + 3 * std::uint64_t{y} + sample) % 7 == 0;
 }

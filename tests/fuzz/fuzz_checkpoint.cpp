@@ -38,7 +38,7 @@ bool sameBits(const std::vector<double>& a, const std::vector<double>& b) {
     return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof a[0]) == 0;
 }
 
-/// What `crt develop` does with a film that has a record.
+/// The steps of `crt develop` for a film that has a record.
 void develop(const crt::Film& film, crt::FilmIdentity identity, const crt::fuzz::Directory& directory) {
     using namespace crt;
     FilmRecord& record = *identity.record;
@@ -69,7 +69,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         const auto [film, identity] = readCheckpoint(path);
         // Of any version of the bits, or a change of bits would make every seed worthless.
         requireSameScene(path, identity, {identity.scene_hash, "another version", identity.bits_version});
-        // What follows a resume: adding to an empty film, errors and an image.
+        // The steps after a resume: adding to an empty film, errors and an image.
         Film resumed(film.shape());
         resumed.add(film);
         if (resumed.samples.ranges() != film.samples.ranges())

@@ -1,5 +1,5 @@
-// glTF and GLB → text of a scene → Scene. What begins with "glTF" is a GLB, everything else JSON with
-// its bytes in data: URIs.
+// glTF and GLB → text of a scene → Scene. An input that begins with "glTF" is a GLB, everything else
+// JSON with its bytes in data: URIs.
 #include "fuzz_target.h"
 
 #include "scene/import/import.h"
@@ -9,7 +9,7 @@
 
 namespace {
 
-/// What readGltfPrimitive() promises to everybody behind it.
+/// The guarantees of readGltfPrimitive().
 void checkMesh(const crt::Mesh& mesh) {
     using crt::fuzz::finding;
     if (mesh.triangles.empty()) finding("mesh", "has no triangles");

@@ -11,7 +11,7 @@
 
 namespace {
 
-/// Where the scene file is said to lie.
+/// The assumed folder of the scene file.
 struct Neighbours : crt::fuzz::Directory {
     Neighbours() {
         write("a.obj", "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl m\nf 1 2 3\n");

@@ -1,4 +1,4 @@
-/// What the fuzz targets share: files in memory, and the rule of what may come back from hostile input.
+/// The shared parts of the fuzz targets: files in memory, and the rule for results of hostile input.
 #pragma once
 
 #include "base/error.h"
@@ -25,8 +25,8 @@ namespace crt::fuzz {
     std::abort();
 }
 
-/// How often a body came to its end: seeds must (replay.cpp), or nothing behind the first refusal is ever
-/// fuzzed.
+/// Number of times that a body came to its end: seeds must (replay.cpp), or nothing behind the first refusal
+/// is ever fuzzed.
 inline int accepted = 0;
 
 /// Runs `body`. Hostile input may be refused, by an error that says whose fault it is; it may not find a bug

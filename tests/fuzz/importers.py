@@ -4,7 +4,7 @@
     tests/fuzz/importers.py                           100 mutations of each scene of corpus/importers
     tests/fuzz/importers.py --mutations 2000 FOLDER…  of each .pbrt and .xml below these folders as well
 
-A finding is another exception than crt.Error, an error without file, line and column, more than 10 s of
+Findings: an exception other than crt.Error, an error without file, line and column, more than 10 s of
 processor time, or more than 2 GiB of memory. The input stays in --findings. Exit code 1 when anything was
 found. Needs the package crt on PYTHONPATH.
 """

@@ -1,6 +1,6 @@
 // Runs a fuzz target over the seeds in the folders that are named, without libFuzzer and with any compiler.
-// Every seed must be read to the end: a format that changes makes seeds of the old one worthless, and nobody
-// would notice.
+// Every seed must be read to the end: a format that changes makes seeds of the old one worthless, without a
+// visible sign.
 #include "fuzz_target.h"
 
 #include <fstream>

@@ -3,7 +3,7 @@
 things, no idioms. CONTRIBUTING.md has the rules with examples. Messages and pages may break none of the
 patterns below; comments break COMMENTS of them, a number that may only fall. Exit code 1 names the lines.
 
-    tests/rooms/check_language.py [--comments] [--root FOLDER] [FOLDER...]   only these; also of comments
+tests/rooms/check_language.py [--comments] [--root FOLDER] [FOLDER...]   only these; also of comments
 """
 
 import argparse
@@ -21,9 +21,9 @@ FOLDERS = ("bench", "core", "docs", "plugins", "python", "scripts", "tests")
 PAGES = ("README.md", "CONTRIBUTING.md")
 # Texts that a user sees: strings of these folders, except of tests.
 SEEN = ("core", "plugins", "python/crt", "python/src")
-# Folders with a separate bound, which may only fall.
-LATER = {"core/kernel": 113, "core/judge/verify": 65, "docs/results": 69}
-COMMENTS = 1158
+# With separate bounds, which may only fall; docs/stability.md is made from core/judge/verify.
+LATER = {"core/kernel": 113, "core/judge/verify": 65, "docs/results": 69, "docs/stability.md": 1}
+COMMENTS = 0
 # The rules quote what they forbid.
 QUOTES = {"CONTRIBUTING.md", "tests/rooms/check_language.py", "tests/rooms/test_language.py"}
 
@@ -89,7 +89,7 @@ def has_main_clause(kind, sentence):
 
 def area(name, kind):
     for folder in LATER:
-        if name.startswith(folder + "/"):
+        if name == folder or name.startswith(folder + "/"):
             return folder
     if kind == "comment":
         return "comments"

@@ -17,7 +17,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 FENCE = re.compile(r"^ {0,3}(`{3,}|~{3,})")
 HEADING = re.compile(r"^ {0,3}#{1,6}\s+(.*?)\s*#*\s*$")
 SPAN = re.compile(r"(`+).+?\1")
-# [text](target "title") and ![text](target); text may hold an image, which is then a link of its own.
+# [text](target "title") and ![text](target); text may hold an image, which is then a separate link.
 INLINE = re.compile(r"\]\(\s*(?:<([^>]*)>|([^\s()]*(?:\([^\s()]*\)[^\s()]*)*))(?:\s+[\"'][^)]*)?\s*\)")
 REFERENCE = re.compile(r"^ {0,3}\[[^\]]+\]:\s+(\S+)")
 USED = re.compile(r"\[([^\][]+)\]\[([^\][]*)\]")
@@ -110,7 +110,7 @@ class Tree:
         return sorted(file for file in self.files if file.suffix in (".md", ".ipynb"))
 
     def wrong(self, page, target):
-        """Why `target` in `page` leads nowhere, or None."""
+        """The error of `target` in `page`, or None."""
         if ELSEWHERE.match(target):
             return None
         if "which is not defined" in target:

@@ -19,7 +19,7 @@ TAKEN = "crt"  # by another project on PyPI
 
 
 def patterns(pyproject):
-    """What must not be written: `pip install` of one of the names, after options and other packages, where a
+    """The forbidden texts: `pip install` of one of the names, after options and other packages, where a
     line may end after `install`; and a name with an extra, wherever it stands."""
     name = NAME.search(pyproject)[1]
     extras = "|".join(re.findall(r"^(\w+) =", EXTRAS.search(pyproject)[1], re.MULTILINE))

@@ -35,7 +35,7 @@ OTHER_TARGETS = {
 }
 
 
-# Folders that are no room of their own, and the room that they are linked to (libcrt).
+# Folders that are not rooms, and the room that they are linked to (libcrt).
 BESIDE = {"api": "render"}
 
 
@@ -160,7 +160,7 @@ def draw(rooms):
     width = max(len(folder) for folder in rooms)
     lines = ["```text"]
     for folder, room in rooms.items():
-        # What another of its rooms brings along is not drawn again.
+        # Rooms that another of its rooms already uses are not drawn again.
         direct = [u for u in room.uses if not any(u in seen_from(rooms, v) for v in room.uses if v != u)]
         lines.append(f"{folder:<{width}}  →  {', '.join(direct)}".rstrip(" →"))
         lines += [f"{beside:<{width}}  →  {room}" for beside, room in BESIDE.items() if room == folder]

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""What the site is made with (scripts/site), as far as it needs no library: links are rewritten, lists get
-their blank line, and what is broken in the HTML is found."""
+"""The programs that make the site (scripts/site), as far as they need no library: links are rewritten, lists
+get their blank line, and errors in the HTML are found."""
 
 import pathlib
 import sys

@@ -1,5 +1,5 @@
-"""What the tests of the page of `crt view` share: a browser, and a page of a view in it. Needs Playwright
-and Chromium; without them exit code 77 says that a test was skipped.
+"""The shared parts of the tests of the page of `crt view`: a browser, and a page of a view in it. Needs
+Playwright and Chromium; without them exit code 77 says that a test was skipped.
 """
 
 import pathlib

@@ -118,7 +118,7 @@ class Hands(PageTest):
         self.assertNotEqual(self.pixels(page), before)
         self.assertIn(f"{after['position'][1]:.7g}", page.locator("#yaml").text_content())
         number = self.number(page)
-        page.get_by_role("button", name="As in the scene").click()
+        page.get_by_role("button", name="Reset to the scene").click()
         self.done_beyond(page, number)
         self.assertEqual(self.pixels(page), before)
 

@@ -395,7 +395,7 @@ constexpr CrtBackend makeBackend(const char* name, const char* version, const ch
 }
 
 /// The device that --device selects: "" or null the best score, digits an index, else the first (best) whose
-/// name holds the text, in any case. Throws PluginError(CRT_NO_DEVICE) that lists what there is.
+/// name holds the text, in upper or lower case. Throws PluginError(CRT_NO_DEVICE) that lists what there is.
 inline const CrtDevice& chooseDevice(const std::vector<CrtDevice>& devices, const char* wanted) {
     const std::string text = wanted != nullptr ? wanted : "";
     const bool is_index = !text.empty() && text.find_first_not_of("0123456789") == std::string::npos;

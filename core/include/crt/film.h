@@ -66,7 +66,7 @@ public:
     std::array<double, 3> mean(std::uint32_t x, std::uint32_t y) const;
     /// Nothing where it is not known: too few samples, or one Sobol sequence.
     std::optional<ErrorEstimate> error() const;
-    /// Whether crt render --target-error would stop: the error is known and half_width_95 at most `target`
+    /// True if crt render --target-error would stop: the error is known and half_width_95 at most `target`
     /// of all pixels, and of the even and of the odd ones of a checkerboard.
     bool errorWithin(double target) const;
 

@@ -104,7 +104,7 @@ void addMetrics(CompareResult& result, const std::vector<float>& a, const std::v
 }
 
 void addLooks(CompareResult& result, const Image& a, const Image& b, bool display_referred) {
-    // Who does not name its primaries is taken to have the other's.
+    // An image that does not name its primaries is assumed to have the other's.
     const auto seen_a = linearSrgb(a, a.chromaticities ? a.chromaticities : b.chromaticities);
     const auto seen_b = linearSrgb(b, b.chromaticities ? b.chromaticities : a.chromaticities);
     if (!seen_a || !seen_b) return;
@@ -114,8 +114,8 @@ void addLooks(CompareResult& result, const Image& a, const Image& b, bool displa
                            : perceivedDifference(*seen_a, *seen_b, a.width, a.height, display_referred);
 }
 
-/// Why pixels of two crop windows of one picture do not belong together; empty when they do, or when one
-/// does not say which part of a picture it is.
+/// Reason why pixels of two crop windows of one image do not correspond; empty if they do, or if one image
+/// does not state its crop window.
 std::string windowConflict(const Image& a, const Image& b) {
     if (a.whole_width == 0 || b.whole_width == 0) return {};
     const auto same = [](const Image& i) {

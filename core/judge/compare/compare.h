@@ -38,10 +38,10 @@ struct Difference {
 struct CompareResult {
     bool same = false;
     double tolerance = 0;
-    /// Why the images cannot be compared (other size, other channels, colours under other conditions); empty
-    /// when they can. Then everything below is zero.
+    /// Reason why the images cannot be compared (size, channels or colour settings differ); empty if they
+    /// can. Then everything below is zero.
     std::string mismatch;
-    /// What had to be supposed to compare them, one sentence each, without a full stop.
+    /// Assumptions of the comparison, one sentence each, without a full stop.
     std::vector<std::string> notes;
     std::uint32_t width = 0, height = 0;
     std::vector<std::string> channels;        ///< Compared bit by bit.

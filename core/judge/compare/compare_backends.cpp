@@ -31,7 +31,7 @@ public:
         state_.target = samples;
         state_.pixels = pixels;
     }
-    /// Where a render of `samples` stands. [any thread, one render at a time]
+    /// Path of a render of `samples`. [any thread, one render at a time]
     void show(double done, std::uint64_t samples) {
         ProgressState now = state_;
         now.samples =
@@ -89,7 +89,7 @@ std::vector<double> colorsOf(const Film& film) {
     return values;
 }
 
-/// What one backend rendered.
+/// The render of one backend.
 struct Renders {
     Image same_seed;
     stats::Replicates replicates;

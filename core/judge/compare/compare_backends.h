@@ -17,7 +17,7 @@ struct BackendComparisonOptions {
     std::vector<std::string> backends;  ///< Two or more; the last is what the others are compared with.
     std::uint64_t samples = 0;  ///< Per pixel and replicate; 0: so many that all replicates together have
                                 ///< the scene's, a power of two.
-    std::uint32_t replicates = 16;      ///< Of each backend, every one with a seed of its own.
+    std::uint32_t replicates = 16;      ///< Of each backend, each with a different seed.
     stats::GateOptions gate;
 };
 

@@ -33,7 +33,7 @@ std::optional<Pair> commonView(const Image& a, const Image& b) {
     return std::nullopt;
 }
 
-/// An image without noise of its own, as the other is seen.
+/// An image without its own noise, with the settings of the other.
 NoisyImage exactly(const Image& image, const NoisyImage& like) {
     NoisyImage exact;
     exact.channels = like.channels;

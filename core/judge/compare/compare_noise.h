@@ -14,18 +14,18 @@ struct ChannelBias {
     double mean_a = 0, mean_b = 0;
     double difference = 0;     ///< mean_a − mean_b
     stats::Interval interval;  ///< Of the difference, at NoiseComparison::confidence.
-    double p = 1;              ///< That the means are equal.
+    double p = 1;              ///< P that the means are equal.
     bool beyondNoise() const { return !interval.contains(0); }  ///< The same as p < 1 − confidence.
 };
 
-/// What is left of the difference when every pixel of A has B's luminance: of R, G or B.
+/// The remaining difference of R, G or B when every pixel of A has B's luminance.
 struct ColourShift {
     std::string channel;
     double relative = 0;  ///< Mean over the image, over B's mean luminance.
-    double p = 1;         ///< That there is none: by the signs of the pixels' differences.
+    double p = 1;         ///< P that there is no bias: by the signs of the pixels' differences.
 };
 
-/// What the images' own noise says of their difference. When nothing is wrong, an alarm of each kind (a
+/// The verdict of the images' own noise on their difference. When nothing is wrong, an alarm of each kind (a
 /// channel's mean, any tile, any pixel) is as rare as 1 − confidence: where noise is normal; and, of means
 /// and tiles, also where the images differ in their seeds alone, whatever the noise and however few the
 /// degrees of freedom of the stated variances. Means and tiles are judged by the stated noise and by the
@@ -39,17 +39,19 @@ struct ColourShift {
 /// both, the mean is judged as if noise were normal; that of tiles is then at least the average of the tiles
 /// about them.
 struct NoiseComparison {
-    std::string unknown;             ///< Why nothing is said, one sentence; then all else is empty.
+    std::string unknown;             ///< Reason why there is no verdict, one sentence; then all else is
+                                     ///< empty.
     std::string source_a, source_b;  ///< Where variances are from; empty: none, the image is taken as exact.
     bool stated = false;             ///< One image at least says how large its noise is.
     double confidence = 0.999;
     std::vector<ChannelBias> channels;
     std::vector<ColourShift>
         colours;                  ///< R, G and B, where `channels` is luminance alone and colour is judged.
-    std::string colour_unjudged;  ///< Why it is not, one sentence without a full stop; empty when it is.
+    std::string colour_unjudged;  ///< Reason why it is not, one sentence without a full stop; empty if it
+                                  ///< is.
     stats::TestFamily tiles, pixels;  ///< Channels among them: `worst` is place · channels + channel.
-    std::string pixels_untested;  ///< Why single pixels are not tested, one sentence without a full stop;
-                                  ///< empty when they are.
+    std::string pixels_untested;  ///< Reason why single pixels are not tested, one sentence without a full
+                                  ///< stop; empty if they are.
     std::uint32_t tiles_across = 0;
     /// (a − b) / standard error; [pixel][channel]. 0 where there is neither noise nor difference, infinite
     /// where no noise. The standard error is the larger of the pixel's own and the average of the 7 × 7

@@ -1,4 +1,4 @@
-/// How far two images are from a reference, which has noise of its own.
+/// Compares the errors of two images against a noisy reference.
 #pragma once
 
 #include "film/film.h"
@@ -29,13 +29,13 @@ struct ReferenceError {
     /// a reference without noise. Nothing while its variance is unknown, or when the error is within it.
     std::optional<double> corrected_relative_rmse;
     bool within_reference_noise = false;
-    std::vector<std::string> warnings;      ///< Why not to trust it: one sentence each.
+    std::vector<std::string> warnings;      ///< Reasons not to trust it: one sentence each.
 };
 
 struct ReferenceComparison {
     /// √ mean variance of the reference's luminance / its mean luminance.
     std::optional<double> reference_rms_error;
-    std::vector<std::string> notes;  ///< What had to be supposed, one sentence each, without a full stop.
+    std::vector<std::string> notes;  ///< Assumptions, one sentence each, without a full stop.
     std::string reference_noise_source;
     std::array<ReferenceError, 2> errors;        ///< Of a and of b.
 };

@@ -74,7 +74,7 @@ std::string familyText(const stats::TestFamily& family, const char* method, cons
                        family.tests, family.smallest_p, method, family.rejected > 0 ? ", " + worst : "");
 }
 
-/// Where luminance alone has a stated noise.
+/// For images that state only the noise of luminance.
 void addColourLine(Lines& lines, const NoiseComparison& noise) {
     if (!noise.colour_unjudged.empty())
         lines.add("colour", "luminance only; colour is not judged: " + noise.colour_unjudged);

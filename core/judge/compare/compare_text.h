@@ -1,4 +1,4 @@
-/// What `crt compare` found, for people and for programs.
+/// The results of `crt compare` as text and as JSON.
 #pragma once
 
 #include "judge/compare/compare.h"

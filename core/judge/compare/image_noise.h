@@ -1,4 +1,4 @@
-/// What an image says of its own noise, by the channels that it carries beside its colour.
+/// Reads the noise of an image from the channels that it stores next to its colour.
 #pragma once
 
 #include "film/film.h"

@@ -1,4 +1,4 @@
-/// How different two images look: FLIP and CIEDE2000 of what a screen shows of them.
+/// The perceived difference of two images: FLIP and CIEDE2000 of their appearance on a screen.
 #pragma once
 
 #include "film/film.h"

@@ -9,7 +9,7 @@
 #include "base/log.h"
 #include "base/stopwatch.h"
 #include "base/unit_text.h"
-#include "judge/converge/contestant.h"
+#include "judge/converge/configuration_run.h"
 #include "judge/converge/experiment.h"
 #include "judge/converge/files.h"
 #include "judge/converge/findings.h"
@@ -67,7 +67,7 @@ private:
     std::string path(const std::string& name) const { return (fs::path(request_.output) / name).string(); }
     bool stopped() const { return watch_.stopRequested().has_value(); }
 
-    /// Rows are told apart by scene, backend and variant: each of these once.
+    /// Scene, backend and variant identify rows: each of these once.
     void refuseAmbiguity() {
         names_ = namesOfScenes(request_.scenes);
         refuseRepeats(request_.backends, "--backends");
@@ -131,7 +131,7 @@ private:
         }
     }
 
-    /// What this run is, for those who resume it; or, resuming, that it is the same.
+    /// Writes the identity of this run for a later --resume; when resuming, checks that it is the same.
     void claimFolder() {
         Experiment experiment{commonProperties(buildInfo(), request_.integrator)};
         for (std::size_t s = 0; s < scenes_.size(); ++s) {
@@ -185,7 +185,7 @@ private:
         return {};
     }
 
-    /// Where no reference was given: one from a quarter of the time. It is of the same estimator, which has
+    /// Without a reference, crt makes one in a quarter of the time. It is of the same estimator, which has
     /// far less noise, and so is blind to a bias that all light sampling shares; what it sees is a bias of
     /// sampler, roulette, seeds and backends.
     void makeReferences() {
@@ -256,11 +256,12 @@ private:
         return nullptr;
     }
 
-    /// Libraries, drivers and caches are warm before any start-up is timed: else whoever comes first pays
-    /// for all. Where starts take so long that little time would be left, it is not done, and said.
-    void warmUp(const Key& key, const Contestant::LoadScene& load) {
+    /// Libraries, drivers and caches are warmed up before any start-up is timed: otherwise the first
+    /// configuration would pay for all. Where starts take so long that little time would be left, it is not
+    /// done, and said.
+    void warmUp(const Key& key, const ConfigurationRun::LoadScene& load) {
         if (elapsed() < (kReferenceShare + kWarmUpShare) * request_.seconds) {
-            Contestant(key, load, nullptr, request_.integrator).prepare();
+            ConfigurationRun(key, load, nullptr, request_.integrator).prepare();
             return;
         }
         if (!left_cold_)
@@ -282,20 +283,20 @@ private:
                         const Scene scene = load();
                         const Reference* reference = referenceFor(s, scene, key);
                         warmUp(key, [&scene] { return scene; });
-                        contestants_.push_back(
-                            std::make_unique<Contestant>(key, load, reference, request_.integrator));
-                        contestants_.back()->prepare();
-                        order_.push_back({key, contestants_.back().get(), {}});
+                        runs_.push_back(
+                            std::make_unique<ConfigurationRun>(key, load, reference, request_.integrator));
+                        runs_.back()->prepare();
+                        order_.push_back({key, runs_.back().get(), {}});
                     } catch (const Error& error) {
                         if (error.kind() != ErrorKind::Backend) throw;
                         order_.push_back({key, nullptr, error.what()});
                     }
                 }
-        if (contestants_.empty())
+        if (runs_.empty())
             throw Error(ErrorKind::Backend,
                         fmt::format("none of the backends can run: {}", order_.front().omitted));
         for (const Entry& entry : order_)
-            if (!entry.contestant) logInfo("left out: {}", entry.omitted);
+            if (!entry.run) logInfo("left out: {}", entry.omitted);
     }
 
     void render() {
@@ -305,11 +306,11 @@ private:
         // configurations alike.
         const double for_report = 1 + 0.01 * request_.seconds;
         const double share = std::max(0.0, request_.seconds - elapsed() - for_report) /
-                             static_cast<double>(request_.replicates * contestants_.size());
+                             static_cast<double>(request_.replicates * runs_.size());
         resumeReplicates();
         for (std::uint32_t replicate = 0;; ++replicate) {
             double round = 0;
-            for (const auto& contestant : contestants_) round += contestant->secondsOfLastReplicate();
+            for (const auto& run : runs_) round += run->secondsOfLastReplicate();
             if (replicate >= 2 && replicate < request_.replicates &&
                 elapsed() + round > 1.05 * request_.seconds) {
                 run_.notes.push_back(
@@ -317,11 +318,11 @@ private:
                 break;
             }
             if (replicate >= request_.replicates && elapsed() + round + for_report > request_.seconds) break;
-            for (const auto& contestant : contestants_) {
-                if (contestant->looks().begin() != contestant->looks().end() &&
-                    contestant->looks().begin()->second.count(replicate) > 0)
+            for (const auto& run : runs_) {
+                if (run->looks().begin() != run->looks().end() &&
+                    run->looks().begin()->second.count(replicate) > 0)
                     continue;
-                if (!renderOne(*contestant, replicate, share, stop)) {
+                if (!renderOne(*run, replicate, share, stop)) {
                     run_.notes.push_back(fmt::format(
                         "interrupted after {} rounds of replicates; --resume continues", replicate));
                     return;
@@ -331,25 +332,25 @@ private:
         }
     }
 
-    /// Every so many replicates begin with a start of their own: each, unless starts would take more than
-    /// kStartShare of the time.
-    std::uint32_t replicatesForAStart(const Contestant& contestant, double share) {
-        const double starts = std::ceil(contestant.startSeconds() / std::max(kStartShare * share, 1e-9));
+    /// Replicates begin with a separate start at a fixed interval: each one, unless starts would take more
+    /// than kStartShare of the time.
+    std::uint32_t replicatesForAStart(const ConfigurationRun& run, double share) {
+        const double starts = std::ceil(run.startSeconds() / std::max(kStartShare * share, 1e-9));
         const auto every = static_cast<std::uint32_t>(std::clamp(starts, 1.0, 1e6));
-        if (every >= request_.replicates && contestant.samplesReached() == 0)
+        if (every >= request_.replicates && run.samplesReached() == 0)
             run_.notes.push_back(fmt::format(
                 "{}: starting {} takes so long that it was timed once only: times that include it have no "
                 "confidence interval",
-                contestant.key().scene, labelOf(contestant.key())));
+                run.key().scene, labelOf(run.key())));
         return every;
     }
 
-    bool renderOne(Contestant& contestant, std::uint32_t replicate, double share,
+    bool renderOne(ConfigurationRun& run, std::uint32_t replicate, double share,
                    const std::function<bool()>& stop) {
-        const std::uint32_t every = replicatesForAStart(contestant, share);
-        if (replicate % every == 0) contestant.restart();
-        share = std::max(0.0, share - contestant.startSeconds() / every);
-        const std::uint64_t most = replicate == 0 ? request_.max_samples : contestant.samplesReached();
+        const std::uint32_t every = replicatesForAStart(run, share);
+        if (replicate % every == 0) run.restart();
+        share = std::max(0.0, share - run.startSeconds() / every);
+        const std::uint64_t most = replicate == 0 ? request_.max_samples : run.samplesReached();
         const auto found = [&](const Row& row) {
             run_.rows.push_back(row);
             log_->append(row);
@@ -360,8 +361,8 @@ private:
             state.time_limit_seconds = request_.seconds;
             watch_.progress(state);
         };
-        const bool done = contestant.replicate(replicate, most, share, found, stop);
-        if (done) writeReplicate(replicateFile(contestant.key(), replicate), contestant.stored(replicate));
+        const bool done = run.replicate(replicate, most, share, found, stop);
+        if (done) writeReplicate(replicateFile(run.key(), replicate), run.stored(replicate));
         keepSession();
         return done;
     }
@@ -374,15 +375,15 @@ private:
     /// rendered again.
     void resumeReplicates() {
         std::vector<Row> kept;
-        for (const auto& contestant : contestants_)
+        for (const auto& run : runs_)
             for (std::uint32_t replicate = 0; holds_rows_; ++replicate) {
                 std::vector<Row> rows;
                 for (const Row& row : run_.rows)
-                    if (row.key == contestant->key() && row.replicate == replicate) rows.push_back(row);
+                    if (row.key == run->key() && row.replicate == replicate) rows.push_back(row);
                 const std::optional<StoredReplicate> stored =
-                    readReplicate(replicateFile(contestant->key(), replicate), contestant->pixels());
-                if (!stored || !isWhole(*stored, rows, contestant->samplesReached())) break;
-                contestant->restore(replicate, *stored);
+                    readReplicate(replicateFile(run->key(), replicate), run->pixels());
+                if (!stored || !isWhole(*stored, rows, run->samplesReached())) break;
+                run->restore(replicate, *stored);
                 kept.insert(kept.end(), rows.begin(), rows.end());
             }
         run_.rows = std::move(kept);
@@ -398,16 +399,16 @@ private:
 
     int report() {
         for (const Entry& entry : order_) {
-            if (!entry.contestant) {
+            if (!entry.run) {
                 Configuration omitted;
                 omitted.key = entry.key;
                 omitted.omitted = entry.omitted;
                 run_.configurations.push_back(std::move(omitted));
                 continue;
             }
-            fillBetweenReplicates(run_.rows, entry.key, entry.contestant->looks());
-            finish(*entry.contestant);
-            run_.configurations.push_back(entry.contestant->configuration());
+            fillBetweenReplicates(run_.rows, entry.key, entry.run->looks());
+            finish(*entry.run);
+            run_.configurations.push_back(entry.run->configuration());
         }
         for (const Row& row : run_.rows) log_->append(row);
         noteReferences();
@@ -434,10 +435,10 @@ private:
     }
 
     /// A device that fails now costs the maps of one configuration, not what was measured.
-    void finish(Contestant& contestant) {
-        const Key& key = contestant.key();
+    void finish(ConfigurationRun& run) {
+        const Key& key = run.key();
         try {
-            contestant.finish(commonSamples(contestants_, key.scene));
+            run.finish(commonSamples(runs_, key.scene));
         } catch (const Error& error) {
             run_.notes.push_back(
                 fmt::format("{}: there are no maps of {}: {}", key.scene, labelOf(key), error.what()));
@@ -467,7 +468,7 @@ private:
 
     struct Entry {
         Key key;
-        Contestant* contestant;
+        ConfigurationRun* run;
         std::string omitted;
     };
     const ConvergeRequest& request_;
@@ -480,7 +481,7 @@ private:
     std::map<std::pair<std::size_t, std::string>, std::string> contents_;
     std::vector<Scene> scenes_;
     std::vector<std::unique_ptr<Reference>> references_;
-    std::vector<std::unique_ptr<Contestant>> contestants_;
+    std::vector<std::unique_ptr<ConfigurationRun>> runs_;
     std::vector<Entry> order_;
     std::unique_ptr<ResultsLog> log_;
     std::vector<SessionOfRun> sessions_;  ///< This one last.

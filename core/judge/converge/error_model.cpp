@@ -96,7 +96,7 @@ Measure::Measure(const RowsBySamples& by_samples, const ReferenceInfo* reference
             has_error = has_error && row->error.has_value();
             has_folds = has_folds && row->fold_mse.size() == reference->fold_distance.size();
             mean += row->mean_luminance /
-                    static_cast<double>(rows.size());  // What is left is that of the most samples.
+                    static_cast<double>(rows.size());  // The rest is that of the most samples.
         }
     }
     scale_ = std::abs(mean);

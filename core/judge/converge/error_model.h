@@ -43,7 +43,7 @@ double meanOver(Indices replicates, const std::function<double(std::size_t)>& va
 /// Mean start-up of those of the replicates that timed one; NaN where none did.
 double meanStart(const RowList& of_replicates, Indices replicates);
 
-/// How rows of one configuration become relative errors. All are relative² where they are squares.
+/// Converts rows of one configuration to relative errors. All are relative² where they are squares.
 class Measure {
 public:
     /// Against the reference where there is one and every row knows its error, else between replicates.
@@ -52,13 +52,13 @@ public:
 
     ErrorSource source() const { return source_; }
     bool hasReference() const { return reference_ != nullptr; }
-    /// Whether the reference's own variance is more than a tenth of that of the images in a column. Its
+    /// True if the reference's own variance is more than a tenth of that of the images in a column. Its
     /// noise would hide their error.
     bool referenceIsNoisy(const RowList& column) const;
     /// Errors are the spread between replicates from now on; the reference judges bias only.
     void measureErrorsBetweenReplicates() { source_ = ErrorSource::BetweenReplicates; }
     bool usable() const { return scale_ > 0; }
-    /// Of the rows' errors over so many replicates.
+    /// Of the rows' errors over this number of replicates.
     SampleCounts counts(std::size_t replicates) const;
     /// Of biasSquared(), which always knows the reference.
     SampleCounts countsOfBias(std::size_t replicates) const;
@@ -133,10 +133,10 @@ public:
     double samplesBeyond(const Resample& resample, double target, double power) const;
     /// Power of N by which squared error falls over the last four columns.
     double lastPower(const Resample& resample) const;
-    /// How many normal values of one variance would make the squared error of an image scatter as it does
-    /// between the replicates of the last column (Satterthwaite's 2 S²/Var S). With one half more of the
-    /// largest deviation's square, for paths as bright that no replicate has met. Infinite with fewer than
-    /// three replicates.
+    /// The number of normal values of one variance that would make the squared error of an image scatter as
+    /// it does between the replicates of the last column (Satterthwaite's 2 S²/Var S). With one half more
+    /// of the largest deviation's square, for paths as bright that no replicate has met. Infinite with fewer
+    /// than three replicates.
     double valuesOfError() const;
     /// Power of N by which the variance between replicates falls, over all columns.
     double variancePower(const Resample& resample) const;
@@ -166,7 +166,7 @@ public:
     std::vector<double> renderSeconds(const Resample& resample) const;
     /// Intercept: launch; slope: seconds per sample per pixel.
     stats::LineFit line(const Resample& resample) const;
-    /// Seconds that a user waits for so many samples, start-up included.
+    /// Seconds that a user waits for this number of samples, start-up included.
     double secondsTo(const Resample& resample, double samples) const;
 
 private:

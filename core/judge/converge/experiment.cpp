@@ -123,7 +123,7 @@ Properties propertiesOf(const Key& key, const Scene& scene, const std::string& c
                                             scene.sampler.replicates)},
                 {"the seed", std::to_string(scene.sampler.seed)},
                 {"the reference", reference}};
-    // What is to be seen, in words where there are any; the hash has the last word.
+    // The visible scene, in words if there are any; the hash decides.
     for (const SceneTrait& trait : recordOf(scene).traits)
         for (const char* name :
              {"the crop window", "the filter", "the camera", "the geometry", "the materials", "the light"})

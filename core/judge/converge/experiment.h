@@ -1,5 +1,5 @@
-/// What makes a run of `crt converge` the experiment that it is. It is written into the folder when the run
-/// begins, so that --resume can refuse to mix rows of two.
+/// The settings that define a run of `crt converge`. It is written into the folder when the run begins, so
+/// that --resume can refuse to mix rows of two.
 #pragma once
 
 #include "base/host.h"
@@ -20,7 +20,7 @@ struct Properties {
 };
 using Experiment = std::vector<Properties>;
 
-/// What all configurations share: the program and how it is told to render.
+/// Settings that all configurations share: the program and its options.
 Properties commonProperties(const BuildInfo& build, const IntegratorOptions& options);
 /// Of a scene variant; `content`: its hashOfContent(); `reference`: what it is measured against, in words or
 /// as a hash.

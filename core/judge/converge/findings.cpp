@@ -18,8 +18,8 @@ using Fits = std::vector<const ConfigurationFit*>;
 
 /// Quotient of two independent positive estimates, as one of `comparisons` that are looked at: on a
 /// logarithmic scale half widths add in quadrature, and Student's quantile becomes that of confidence 1 −
-/// (1 − c)/comparisons (Bonferroni), so that who was picked because it came out first is not taken for
-/// first.
+/// (1 − c)/comparisons (Bonferroni), so that a configuration that came out first by chance is not reported
+/// as first.
 Estimate quotient(const Estimate& a, const Estimate& b, std::size_t comparisons, std::uint32_t replicates,
                   double confidence) {
     const auto quantile = [&](double alpha) {
@@ -43,12 +43,12 @@ std::uint32_t fewestReplicates(const Fits& fits) {
     return least;
 }
 
-/// How many pairs there are, of which any could have come out as first and next.
+/// Number of pairs of which any could have come out as first and next.
 std::size_t pairsOf(const Fits& fits) {
     return std::max<std::size_t>(1, fits.size() * (fits.size() - 1) / 2);
 }
 
-/// Who reaches an error that all in `reached` measured, and how much sooner than the next.
+/// Reports the first to reach an error that all in `reached` measured, and its lead over the next.
 std::string order(Fits reached, const std::function<const Target&(const ConfigurationFit&)>& target,
                   const std::string& goal, double confidence) {
     std::sort(reached.begin(), reached.end(), [&](const auto* a, const auto* b) {
@@ -69,7 +69,7 @@ std::string order(Fits reached, const std::function<const Target&(const Configur
     return text + fmt::format("; the next, {}, is not distinguishable from it", labelOf(reached[1]->key));
 }
 
-/// Who reaches the target first, among those that did; where none did, no forecast is made.
+/// Reports the first of those that reached the target; if none did, no forecast is made.
 Finding race(const Fits& fits, std::size_t which, double relative_rmse, double confidence) {
     Fits reached;
     for (const ConfigurationFit* fit : fits)
@@ -124,7 +124,7 @@ std::vector<Finding> efficiency(const Fits& fits, double confidence) {
                                         numberText(factor, 2), labelOf(least.key))}};
 }
 
-/// Configurations that render the same bits share errors: whoever reads two equal slopes should know why.
+/// Configurations that render the same bits share errors, which explains equal slopes.
 std::vector<Finding> sameBits(const Fits& fits) {
     std::vector<Finding> findings;
     std::vector<Key> told;
@@ -182,7 +182,7 @@ std::vector<Finding> bias(const Fits& fits, double margin) {
     return findings;
 }
 
-/// How fast error falls: one sentence for all.
+/// The rate at which error falls: one sentence for all.
 std::vector<Finding> slopes(const Fits& fits) {
     Fits fitted;
     for (const ConfigurationFit* fit : fits)
@@ -202,8 +202,8 @@ std::vector<Finding> slopes(const Fits& fits) {
     return {{Tone::Neutral, text + "; independent samples have −0.5."}};
 }
 
-/// What an image says of its own error against what it is, by the interval that the figure shows: right as
-/// far as can be told, off but by less than a tenth, or wrong. A tenth is what one would act upon.
+/// Compares the error that an image states with its actual error, by the interval of the figure: right as
+/// far as is known, off by less than a tenth, or wrong. A tenth is what one would act upon.
 Finding trustIn(const ConfigurationFit& fit) {
     constexpr double kTenth = 1.1;
     const Estimate& ratio = *fit.points.back().calibration;

@@ -1,5 +1,5 @@
-/// What a run has shown, in sentences: who is first and by how much, whether a bias was seen, whether images
-/// judge themselves rightly, what is missing.
+/// The results of a run in sentences: the first configuration and its lead, any bias, the reliability of
+/// stated errors, and missing data.
 #pragma once
 
 #include "judge/converge/fits.h"

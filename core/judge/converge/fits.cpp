@@ -64,10 +64,10 @@ public:
         return fit;
     }
 
-    /// Why no interval of the error can be trusted; empty when they can. Rare bright paths that carry the
-    /// variance are met by few of the replicates, or only as samples become more.
+    /// Reason why no interval of the error can be trusted; empty if they can. Rare bright paths that carry
+    /// the variance are met by few of the replicates, or only as samples become more.
     std::string unknownError() const {
-        constexpr double kFewestValues = 2;  // As an image asks for (film/error_estimate.h).
+        constexpr double kFewestValues = 2;  // As for an image (film/error_estimate.h).
         if (const double values = error_.valuesOfError(); values < kFewestValues)
             return fmt::format(
                 "the squared errors of its replicates scatter like those of only {:.2g} normal values, and "
@@ -114,7 +114,7 @@ public:
         const std::vector<std::size_t> all = allOf(error_.replicates());
         Target target;
         target.relative_rmse = relative_rmse;
-        // What another backend with the same bits has measured, this one has not.
+        // Measurements of another backend with the same bits hold for this one.
         const double measured = error_.samplesTo({all, {}, 0}, mse, false);
         target.reached = std::isfinite(measured) && measured <= time_.lastSamples();
         target.at_first_point = error_.errors({all, {}, 0}).front() <= mse;
@@ -204,7 +204,7 @@ bool sameBits(const Row& a, const Row& b) {
            mse(a) == mse(b) && a.fold_mse == b.fold_mse;
 }
 
-/// Whether all rows that both have are the same, and there are two of them at least.
+/// True if all common rows are the same, and there are at least two of them.
 bool sameBits(const RowsBySamples& a, const RowsBySamples& b) {
     std::size_t common = 0;
     for (const auto& [samples, rows] : a) {
@@ -246,9 +246,9 @@ void collectRows(Subject& subject, const Run& run) {
     subject.errors = subject.own;
 }
 
-/// Of each number of samples the rows of whoever has most replicates there; they are not mixed, for the
-/// variance between them is of all replicates of one configuration. The tests of images are of whoever went
-/// farthest.
+/// For each number of samples the rows of the configuration with the most replicates there; they are not
+/// mixed, because the variance between them must be of all replicates of one configuration. The tests of
+/// images come from the configuration with the most samples.
 void shareSameBits(std::vector<Subject>& subjects) {
     const auto progress = [](const Subject& s) {
         return s.own.empty() ? std::pair<std::uint64_t, std::size_t>{}
@@ -324,8 +324,8 @@ void fitSubject(Subject& subject, const FitOptions& options) {
     if (!fit.unknown_error.empty()) forgetErrors(fit);
 }
 
-/// What a configuration's errors are measured by, its points and its fits. A reference that is noisier than
-/// the images judges bias only; unless it sees one, which is then part of the error.
+/// The reference of a configuration's errors, its points and its fits. A reference that is noisier than the
+/// images judges bias only; unless it sees one, which is then part of the error.
 void measureAndFit(Subject& subject, const FitOptions& options) {
     const double pixels = static_cast<double>(subject.configuration->width) * subject.configuration->height;
     subject.measure.emplace(subject.errors, subject.reference, std::max(1.0, pixels));

@@ -5,8 +5,8 @@
 /// replicates, without one; stats/luminance_error.h), so mean squared errors here are relative² and 0.01²
 /// is "1 %". The reference's own variance is subtracted from every mean squared error.
 ///
-/// Where intervals come from. Rows of one replicate are looks at one progressive render, so only replicates
-/// are independent, and so are the folds of a reference. Every interval is the jackknife over both
+/// Source of intervals. Rows of one replicate are looks at one progressive render, so only replicates are
+/// independent, and so are the folds of a reference. Every interval is the jackknife over both
 /// (jackknife.h): leave one out, repeat the whole fit. Positive quantities are treated as logarithms. For
 /// means it is Student's interval exactly; for the rest unit_fits.cpp and docs/results/accuracy.md
 /// measure the coverage.
@@ -48,7 +48,7 @@ enum class ErrorSource {
 struct Point {
     std::uint64_t samples = 0;
     std::uint32_t replicates = 0;
-    Estimate seconds;            ///< What a user waits who asks for N: start-up and render.
+    Estimate seconds;            ///< The waiting time of a user for N samples: start-up and render.
     Estimate render_seconds;
     Estimate relative_rmse;      ///< 0, or from 0 on, where the reference's own noise hides the error.
     /// 1/(relative MSE × seconds), start-up included. 1/s. NaN where there is no error.
@@ -118,12 +118,13 @@ struct ConfigurationFit {
     /// Of the errors. BetweenReplicates, too, where the reference is noisier than a third of the images' own
     /// error and no bias is seen against it.
     ErrorSource source = ErrorSource::BetweenReplicates;
-    bool has_reference = false;       ///< Which judges bias.
+    bool has_reference = false;       ///< The rows that judge bias.
     std::vector<Point> points;        ///< By samples. Those with two replicates at least.
     /// Three points or more with two replicates each; else all below but the judgement is empty.
     bool fitted = false;
-    /// Why the error is not yet known, in the sense in which images say so of theirs: one sentence without a
-    /// full stop; empty when it is. Then what is below has values without bounds, and no targets.
+    /// Reason why the error is not yet known, in the sense of the error estimate of images: one sentence
+    /// without a full stop; empty if it is known. Then what is below has values without bounds, and no
+    /// targets.
     std::string unknown_error;
     TimeFit time;
     ErrorFit error;
@@ -149,7 +150,8 @@ struct Analysis {
 
 Analysis analyze(const Run& run, const FitOptions& options = {});
 
-/// What Configuration::tests takes over from a gate; empty where the gate had values that are no numbers.
+/// The part of a test's result that Configuration::tests takes over; empty if the test had values that are
+/// NaN or infinite.
 ImageTests imageTestsOf(const stats::GateResult& gate);
 
 /// The reference of a scene, or null when there is none.

@@ -17,14 +17,14 @@ namespace crt::converge {
 
 using Indices = std::span<const std::size_t>;
 
-/// What a statistic is reckoned from: some of the replicates, and the reference whole or without one fold.
+/// Data of a statistic: some of the replicates, and the reference whole or without one fold.
 struct Resample {
     Indices errors, times;
     std::size_t reference_part = 0;  ///< 0: all folds; k + 1: without fold k.
 };
 using Statistic = std::function<double(const Resample&)>;
 
-/// How many of each there are to leave out. 0: the statistic does not depend on them.
+/// Number of each to leave out. 0: the statistic does not depend on them.
 struct SampleCounts {
     std::size_t errors = 0, times = 0, folds = 0;
     /// Of the standard error that replicates of errors cause; infinite where nothing is known of it.

@@ -1,4 +1,4 @@
-/// What the JSON files of `crt converge` have in common.
+/// Shared parts of the JSON files of `crt converge`.
 #pragma once
 
 #include "judge/converge/measurement.h"

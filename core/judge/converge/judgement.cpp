@@ -28,9 +28,10 @@ double foldsOf(const ReferenceInfo& reference) {
                                                  : static_cast<double>(reference.fold_mean_luminance.size());
 }
 
-/// Every replicate's mean lies above what is allowed, and the signs of so many are proof: the noise of light
-/// has its long tail above, so that a replicate without bias is too bright with a probability of one half at
-/// most. Too dark it may well be, where light is found by rare paths that none of them has met.
+/// Every replicate's mean lies above what is allowed, and the signs of this number of replicates are proof:
+/// the noise of light has its long tail above, so that a replicate without bias is too bright with a
+/// probability of one half at most. Too dark it may well be, where light is found by rare paths that none of
+/// them has met.
 bool surelyTooBright(const RowList& rows, const ReferenceInfo& reference, std::size_t channel,
                      const FitOptions& options) {
     if (std::exp2(-static_cast<double>(rows.size())) > (1 - options.verdict_confidence) / 3) return false;
@@ -71,7 +72,7 @@ double relativeVarianceOf(const ReferenceInfo& reference) {
     return std::pow(stats::relativeRmse(reference.mean_variance, reference.mean_luminance), 2);
 }
 
-/// What replicates, tiles and pixels say with a reference; empty where nothing is wrong with them.
+/// Verdicts of replicates, tiles and pixels with a reference; empty if they find no error.
 std::optional<Judgement> faultOf(const ConfigurationFit& fit, const ImageTests& tests, const Pooled& pooled,
                                  const ReferenceInfo& reference, const FitOptions& options) {
     const double margin = options.equivalence_margin, confidence = 100 * options.verdict_confidence;

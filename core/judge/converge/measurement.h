@@ -1,5 +1,5 @@
-/// What `crt converge` measures: the contract between the engine that renders and the files, fits and report
-/// made of it.
+/// The measurements of `crt converge`: the contract between the engine that renders and the files, fits and
+/// report made of it.
 ///
 /// A *configuration* is a scene × backend × variant. Each is rendered R times with independent seeds
 /// (*replicates*); a replicate is ONE progressive render, looked at after N = 1, 2, 4 … samples per pixel,
@@ -7,7 +7,7 @@
 /// spread between replicates.
 ///
 /// Times are in seconds, radiances in the scene's units, errors relative to the image mean where the name
-/// says `relative`. What was not measured is an empty optional, never 0: a CPU backend has no device time, a
+/// says `relative`. A missing measurement is an empty optional, never 0: a CPU backend has no device time, a
 /// scene without a reference has no error against one.
 #pragma once
 
@@ -63,7 +63,7 @@ struct Row {
     std::optional<double> render_device_seconds;       ///< The same by the device's clock.
     /// Parse, build, compile, upload and the first sample, with libraries loaded and kernels in the cache:
     /// every start was tried once before it was timed, so that it does not matter who is listed first. Of a
-    /// start made for this replicate; empty where it had none of its own.
+    /// start made for this replicate; empty if it had no separate start.
     std::optional<double> seconds_before_first_sample;
     std::uint64_t paths = 0;                           ///< Since the replicate began, as the two below.
     std::uint64_t closest_rays = 0, shadow_rays = 0;
@@ -81,7 +81,7 @@ struct Row {
     /// stats::effectivePixels of that variance; known with it.
     std::optional<double> effective_pixels;
     std::optional<Estimate>
-        predicted_relative_rmse;  ///< What the image says of itself, from its own scrambles.
+        predicted_relative_rmse;  ///< The error that the image states, from its own scrambles.
 
     double mean_luminance = 0;
     /// R, G, B. Against a closed form, all three are mean luminance.
@@ -141,7 +141,7 @@ struct Maps {
     Plane flip;            ///< In [0, 1].
 };
 
-/// What does not change between the rows of a configuration.
+/// Properties that are constant over the rows of a configuration.
 struct Configuration {
     Key key;
     std::string device, driver,
@@ -153,25 +153,25 @@ struct Configuration {
     StageSeconds stages;
     ImageTests tests;
     Maps maps;
-    std::string omitted;  ///< Why it was not measured (backend not available …); empty when it was. Then
-                          ///< only `key` is filled.
+    std::string omitted;  ///< Reason why it was not measured (backend not available …); empty if it was.
+                          ///< Then only `key` is filled.
 };
 
 enum class ReferenceKind {
     Analytic,     ///< A closed form.
-    Quadrature,   ///< Deterministic, by a program of its own.
+    Quadrature,   ///< Deterministic, by a separate program.
     Independent,  ///< A render with another seed, sampler and estimator.
     None,         ///< Errors are between replicates.
 };
 
-/// What the errors of one scene are measured against.
+/// The reference of the errors of one scene.
 struct ReferenceInfo {
     std::string scene;
     ReferenceKind kind = ReferenceKind::None;
     std::string file, hash;           ///< Hash: XXH3-128 of the file.
     std::uint64_t samples = 0;        ///< Per pixel; 0 for what has no samples.
     std::string estimator;            ///< "independent sampler, no light sampling, no roulette, seed 77"
-    double mean_luminance = 0;        ///< What relative errors are relative to.
+    double mean_luminance = 0;        ///< The denominator of relative errors.
     double mean_luminance_standard_error = 0;
     std::array<double, 3> image_mean{0, 0, 0};           ///< R, G, B.
     std::array<double, 3> image_mean_standard_error{0, 0, 0};
@@ -179,14 +179,14 @@ struct ReferenceInfo {
     double mean_variance = 0;
     /// Relative RMSE between eighths of the reference, divided by √8: its own relative error.
     double eightfold_spread = 0;
-    /// What the folds (eighths) say of themselves; empty where there are none.
+    /// The noise estimate of the folds (eighths); empty without folds.
     std::vector<double> fold_mean_luminance;
     /// Mean squared difference of the luminances of two folds, absolute.
     std::vector<std::vector<double>> fold_distance;
     std::optional<double> effective_pixels;  ///< stats::effectivePixels of the reference's variance.
 };
 
-/// Where and how it all ran.
+/// Place and circumstances of the run.
 struct Environment {
     std::string crt_version, commit;
     bool dirty = false;               ///< The tree had changes that the commit does not.

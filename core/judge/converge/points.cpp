@@ -22,7 +22,7 @@ Estimate rootOf(const SampleCounts& counts, const Statistic& mse, double confide
     return {root_of(e.value), root_of(e.low), root_of(e.high)};
 }
 
-/// Whether two positive estimates of one quantity agree: on a logarithmic scale half widths add in
+/// True if two positive estimates of one quantity agree: on a logarithmic scale half widths add in
 /// quadrature.
 bool holds(const Estimate& predicted, const Estimate& expected) {
     const Estimate &less = predicted.value < expected.value ? predicted : expected,
@@ -116,8 +116,8 @@ private:
     }
 
     /// Predicted over actual error, both as root mean squares over replicates, and how often a prediction's
-    /// interval holds what it predicts: the expected error, which the replicates know with an interval of
-    /// their own.
+    /// interval holds what it predicts: the expected error, which the replicates give with a separate
+    /// interval.
     void calibrate(Point& point) const {
         bool all_predict = true;
         const Estimate& expected = point.relative_rmse;

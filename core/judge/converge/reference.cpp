@@ -175,8 +175,8 @@ struct RenderedFolds {
     PathFacts paths;
 };
 
-/// Each eighth has samples of its own. The first also finds out how many fit into the time. Nothing when a
-/// the Watch asked to stop.
+/// Each eighth has separate samples. The first also finds out how many fit into the time. Nothing when a the
+/// Watch asked to stop.
 std::optional<RenderedFolds> renderFolds(const Scene& scene, Session& session,
                                          const ReferenceRequest& request, Watch& watch) {
     const CompiledScene compiled = session.compile(scene);

@@ -1,5 +1,5 @@
-/// What errors are measured against: a number that is known, or a render that shares as little as possible
-/// with what it judges.
+/// The reference for errors: a known number, or a render that shares as little as possible with the images
+/// that it judges.
 ///
 /// A reference file is an EXR with the mean in R, G, B and, in Fold.0.R … Fold.7.B, the means of eight
 /// independent eighths of its samples: its variance and the spread between eighths follow from them.
@@ -23,7 +23,7 @@ namespace crt::converge {
 
 inline constexpr std::uint32_t kFolds = 8;
 
-/// What `crt reference` is asked for.
+/// The options of `crt reference`.
 struct ReferenceRequest {
     SceneRequest scene;
     std::string backend = "auto";
@@ -38,8 +38,8 @@ struct ReferenceRequest {
 /// Renders it and returns the exit code. Throws crt::Error.
 int makeReference(const ReferenceRequest& request, Watch& watch);
 
-/// The same for a scene that is read already; `request.scene` does not matter. What it took and how noisy it
-/// is, or nothing when the Watch stopped it.
+/// The same for a scene that is read already; `request.scene` does not matter. Its costs and its noise, or
+/// nothing if the Watch stopped it.
 struct MadeReference {
     std::uint64_t samples = 0;  ///< Per pixel.
     std::string estimator;
@@ -56,7 +56,7 @@ Scene referenceScene(Scene scene, bool same_estimator);
 /// Their images are the same when colourText() is, too.
 std::string hashOfContent(const Scene& scene);
 
-/// What becomes of that light in the image: "exposure 0 EV, linear sRGB, no white balance".
+/// The development settings of the image: "exposure 0 EV, linear sRGB, no white balance".
 std::string colourText(const Scene& scene);
 
 /// A reference in memory, of the film's size.

@@ -27,7 +27,7 @@ struct StoredReplicate {
 std::string replicateFileName(const Key& key, std::uint32_t replicate);
 void writeReplicate(const std::string& path, const StoredReplicate& replicate);
 
-/// Nothing where there is no file. Throws crt::Error(Usage) when the file is not a replicate of so many
+/// Nothing where there is no file. Throws crt::Error(Usage) if the file is not a replicate of this number of
 /// pixels.
 std::optional<StoredReplicate> readReplicate(const std::string& path, std::size_t pixels);
 

@@ -62,7 +62,7 @@ std::vector<std::string> hexColours(std::span<const Rgb> anchors) {
     return colours;
 }
 
-/// What the writer of PNG encodes to this byte (IEC 61966-2-1).
+/// The value that the writer of PNG encodes to this byte (IEC 61966-2-1).
 float linearOfSrgb8(std::uint8_t byte) {
     const double s = byte / 255.0;
     return static_cast<float>(s <= 0.04045 ? s / 12.92 : std::pow((s + 0.055) / 1.055, 2.4));
@@ -141,7 +141,7 @@ Image reducedImage(const Image& image) {
     small.chromaticities = image.chromaticities;
     for (std::size_t i = 0; i < planes[0].values.size(); ++i)
         for (const Plane& plane : planes)
-            small.pixels.push_back(std::clamp(plane.values[i], 0.0f, 1.0f));  // What 8 bits can show.
+            small.pixels.push_back(std::clamp(plane.values[i], 0.0f, 1.0f));  // The range of 8 bits.
     return small;
 }
 

@@ -32,7 +32,7 @@ struct MapSet {
     };
     std::vector<OfConfiguration> configurations;
     std::vector<ColourKey> keys;
-    std::string left_out;  ///< Why there are none; empty where there are.
+    std::string left_out;  ///< Reason why there are none; empty if there are some.
 };
 
 /// Writes map-<scene>-<n>-<what>.png into `folder` for configuration `n` of each scene, reduced to 384

@@ -1,4 +1,4 @@
-/// What `--vary` makes of a scene, and how large it is rendered.
+/// Applies `--vary` to a scene, and sets its size.
 #pragma once
 
 #include "render/job.h"

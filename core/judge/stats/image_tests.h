@@ -93,8 +93,8 @@ private:
     std::vector<std::vector<double>> tile_means_;   ///< [tile · channels + channel][replicate]
 };
 
-/// Single pixels are tested with so many replicates of each or more. With fewer, tiles must differ by the
-/// signs of their pixels' differences too (pooled_tests.h).
+/// Single pixels are tested with this number of replicates of each or more. With fewer, tiles must differ by
+/// the signs of their pixels' differences too (pooled_tests.h).
 inline constexpr std::uint64_t kFewestForPixels = 8;
 
 struct GateOptions {
@@ -114,20 +114,19 @@ struct GateResult {
         Interval relative_interval;
         Verdict verdict = Verdict::Inconclusive;
         /// Every replicate's mean differs from every one of the other's by more than delta, the same way;
-        /// and so many would do that by chance, whatever their distribution, as seldom as 1 − confidence
-        /// allows.
+        /// and the probability of this by chance, for any distribution, is at most 1 − confidence.
         bool separated = false;
     };
     std::vector<Channel> channels;
     TestFamily tiles, pixels;        ///< Over channels too: `worst` is place · channels + channel.
-    /// That the tiles' p-values (of the middle channel, where there is noise) are uniform; to be read, not
-    /// judged by.
+    /// P that the tiles' p-values (of the middle channel, if there is noise) are uniform; for information,
+    /// not for the verdict.
     double tile_uniformity_p = 1;
     /// Of a or b: whichever is heavy-tailed, or has the larger share.
     LargestValue largest;
     std::uint64_t not_finite = 0;
     Verdict verdict = Verdict::Inconclusive;
-    std::vector<std::string> reasons;  ///< Why not Pass, one sentence each.
+    std::vector<std::string> reasons;  ///< Reasons for a verdict other than Pass, one sentence each.
 };
 /// Pass: all channels' means are equivalent, no tile and no pixel differs, and no single value decides.
 /// Fail: a mean, tile or pixel differs for certain; where the noise has heavy tails, a mean by the ranks of

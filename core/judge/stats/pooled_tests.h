@@ -35,10 +35,10 @@ double carefulEqualityP(const Mean& a, const Mean& b);
 /// Of the interval that carefulEqualityP's test inverts to.
 double carefulHalfWidth(const Mean& a, const Mean& b, double confidence);
 
-/// P that squared differences add to so much or more over the sum of the variances stated for them (a Mean's
-/// variance and its degrees of freedom): Fisher's F. So a few pixels that carry the sum are judged as few.
-/// It sees what changes up and down alike, and what changes in so few pixels that their signs say nothing. 0
-/// for differences where no variance is stated at all.
+/// P that squared differences add to this amount or more over the sum of the variances stated for them (a
+/// Mean's variance and its degrees of freedom): Fisher's F. So a few pixels that carry the sum are judged as
+/// few. It sees what changes up and down alike, and what changes in so few pixels that their signs say
+/// nothing. 0 for differences where no variance is stated at all.
 ///
 /// All degrees of freedom must be Satterthwaite's without the correction for the scatter of the estimates
 /// (scatteredDof): with it, alarms are ten times as frequent as stated where few pixels carry the noise.
@@ -54,15 +54,15 @@ struct DifferenceSums {
     std::uint64_t count = 0;
     void add(double difference);
 };
-/// P that independent differences, each symmetric about 0, add to so much or more: at most 3.18 times the
-/// normal one, whatever their distributions (Bentkus and Dzindzalieta 2015). Two renders with other seeds
-/// and all else the same differ symmetrically, however heavy the tails of their noise. It uses no stated
-/// variance. 1 when all are 0.
+/// P that independent differences, each symmetric about 0, add to this amount or more: at most 3.18 times
+/// the normal one, whatever their distributions (Bentkus and Dzindzalieta 2015). Two renders with other
+/// seeds and all else the same differ symmetrically, however heavy the tails of their noise. It uses no
+/// stated variance. 1 when all are 0.
 double symmetricP(const DifferenceSums& differences);
 /// Of the interval about the mean of the differences that count, to which symmetricP's test inverts;
 /// infinite with too few of them.
 double symmetricHalfWidth(const DifferenceSums& differences, double confidence);
-/// Below so many pixels symmetricP has no power at the levels that are used here.
+/// Below this number of pixels symmetricP has no power at the levels that are used here.
 inline constexpr std::uint64_t kFewestForSymmetry = 64;
 
 /// Two differences up to this are equal: without noise, say in the sky, there is no other way to tell

@@ -94,7 +94,7 @@ bool isWithin(const fs::path& file, const fs::path& folder) {
     return !unknown && end == whole.end();
 }
 
-/// What refuses to read or write: tinygltf has no business with files.
+/// Callbacks that refuse to read or write: tinygltf must not access files.
 tinygltf::FsCallbacks noFiles() {
     return {[](const std::string&, void*) { return false; },
             [](const std::string& name, void*) { return name; },
@@ -144,7 +144,7 @@ void GltfFile::split() {
     if (number == 0) fail("", "this GLB has no chunk");
 }
 
-/// What readers of JSON do not stand: they recurse.
+/// Nesting beyond the limit of JSON readers, which recurse.
 void GltfFile::checkText() const {
     if (json_.size() > kMostSceneBytes)
         fail("", fmt::format("its JSON has {} bytes; crt reads up to {}", json_.size(), kMostSceneBytes));
@@ -209,7 +209,7 @@ GltfFile::GltfFile(const std::string& path) : path_(path), model_(std::make_uniq
         fail("", fmt::format("its JSON cannot be read: {}", e.what()));
     }
     check(json);
-    // What tinygltf would read files and images for, and what crt has no use for.
+    // Removes the parts for which tinygltf would read files and images, and those that crt does not use.
     for (const char* unused : {"buffers", "images", "animations", "extras"}) json.root.erase(unused);
     if (const auto meshes = json.root.find("meshes"); meshes != json.root.end())
         for (Value& mesh : *meshes)

@@ -63,7 +63,7 @@ public:
 private:
     struct Buffer {
         std::string uri;
-        std::uint64_t bytes = 0;    ///< That the file says.
+        std::uint64_t bytes = 0;    ///< As the file states.
         bool in_container = false;  ///< The GLB's own.
         std::optional<std::string> read;
     };

@@ -18,7 +18,7 @@ namespace crt {
 /// "a list", "17": what is found where something else is expected.
 std::string describeJson(const nlohmann::json& value);
 
-/// Whether crt has what an extension asks for.
+/// True if crt supports an extension.
 bool knowsGltfExtension(const std::string& name);
 
 /// `at` gives the JSON pointer of a value, and is asked for it only where something is wrong.

@@ -20,7 +20,7 @@ using Triangle = std::array<std::uint32_t, 3>;
 
 constexpr double kMostCoordinate = 1e6;  // Texture coordinates beyond have no digits left for the texel.
 
-/// What a primitive names, with its place.
+/// An accessor of a primitive, with its place.
 class Attributes {
 public:
     Attributes(GltfFile& file, const tinygltf::Primitive& primitive, std::string pointer)

@@ -23,10 +23,10 @@ struct GltfPrimitive {
 /// Reads positions, normals, texture coordinates (v turned up), colours and triangles, strips and fans as
 /// triangles. Triangles without area are left out and counted. Throws crt::Error(Scene) with a JSON pointer
 /// for a primitive that is not there, has no triangles by its mode, or whose numbers are out of range.
-/// What it has is told by the members that are not empty.
+/// Members that are not empty show what it has.
 Mesh readGltfPrimitive(GltfFile& file, const GltfPrimitive& which, std::uint64_t& without_area);
 
-/// How the alpha of COLOR_0 is distributed: its least and its most; 1 and 1 where there is none.
+/// Range of the alpha of COLOR_0: its least and its largest value; 1 and 1 without it.
 std::array<double, 2> alphaRange(GltfFile& file, std::size_t mesh, std::size_t primitive);
 
 /// TANGENT, by vertex: a direction, and which way the other one of the surface turns; empty: none.

@@ -12,7 +12,7 @@ namespace crt {
 Vec3d pointAt(const Matrix4d& m, const Vec3d& point);
 Vec3d directionAt(const Matrix4d& m, const Vec3d& direction);
 
-/// Whether the reader of scenes would refuse it: flat, or no numbers.
+/// True if the reader of scenes would refuse it: flat, or not finite.
 bool flattens(const Matrix4d& m);
 
 /// A mesh, camera or light of a node, and where it is in the world.
@@ -30,8 +30,8 @@ struct GltfGraph {
 /// which is its own ancestor, or has two parents.
 GltfGraph readGltfGraph(const GltfFile& file, Losses& losses);
 
-/// Where a mesh stands: that with a skin where its first joint takes it. In the pose in which it was bound
-/// every joint takes it to the same place.
+/// The place of a mesh: with a skin, where its first joint takes it. In the pose in which it was bound every
+/// joint takes it to the same place.
 Matrix4d gltfBindPose(GltfFile& file, const GltfGraph& graph, const GltfPlaced& placed, Losses& losses);
 
 }  // namespace crt

@@ -196,7 +196,7 @@ std::string Writer::objectsText() {
     return text;
 }
 
-/// What the objects show, in the world; nothing where that is too much to look for a place in.
+/// The geometry of the objects, in the world; nothing if it is too much to search for a place in.
 std::vector<PaintedTriangle> Writer::paintedTriangles() {
     std::vector<PaintedTriangle> triangles;
     const auto forPrimitives = [&](const auto& what) {

@@ -69,7 +69,7 @@ struct GltfMaterials::Source {
     std::optional<std::size_t> set;  ///< Of the first texture that could be used; others must have the same.
 };
 
-/// What becomes of it. Texts are values of the scene's keys; empty ones are left out.
+/// Its conversion. Texts are values of the scene's keys; empty ones are left out.
 struct GltfMaterials::Surface {
     std::string color;
     std::array<double, 3> color_factor{1, 1, 1};  ///< On the texture or the colours of vertices, or alone.
@@ -201,7 +201,7 @@ void GltfMaterials::readOpacity(Source& source, Surface& surface) {
     surface.opacity = textures_.form(*texture, more);
 }
 
-/// Where the alpha of COLOR_0 varies. It takes the place of texture coordinates, so that there can be no
+/// True if the alpha of COLOR_0 varies. It takes the place of texture coordinates, so that there can be no
 /// texture beside it.
 void GltfMaterials::readVertexOpacity(Source& source, Surface& surface) {
     const tinygltf::Material& material = source.material;
@@ -281,7 +281,7 @@ void GltfMaterials::readClear(Source& source, Surface& surface) {
     if (volume.Has("thicknessTexture")) losses_.add("a texture of thickness: crt uses the mesh itself as "
                                                     "the body");
     if (surface.color.starts_with("{texture")) losses_.add("a texture that tints what glass lets through");
-    // What is left after the thickness: of the base colour once, and of the attenuation.
+    // Transmittance over the thickness: of the base colour once, and of the attenuation.
     const double distance = gltfNumber(volume, "attenuationDistance", 0);
     std::array<double, 3> left = surface.color.starts_with("{texture") ? kWhite : surface.color_factor;
     const std::array<double, 3> attenuation = bounded(gltfColor(volume, "attenuationColor", kWhite));

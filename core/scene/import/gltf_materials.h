@@ -12,7 +12,7 @@
 
 namespace crt {
 
-/// What a primitive has for its material.
+/// The material of a primitive.
 struct GltfMaterialUse {
     int material = -1;     ///< −1: glTF's own.
     bool colors = false;   ///< COLOR_0.
@@ -25,7 +25,7 @@ struct GltfMaterialUse {
 
 struct GltfMetalParts;
 
-/// What an object needs to have such a material.
+/// Requirements of such a material on its object.
 struct GltfMaterialText {
     std::string name;
     std::size_t uv_set = 0;

@@ -19,8 +19,8 @@ double brightness(const Color& c) {
     return std::sqrt(0.299 * c[0] * c[0] + 0.587 * c[1] * c[1] + 0.114 * c[2] * c[2]);
 }
 
-/// How much of a metal reflects `specular` at once and scatters `diffuse`, by Khronos's converter: a
-/// dielectric reflects 4 %, and the base colour of both parts is the same.
+/// The share of metal with the reflectance `specular` and the diffuse colour `diffuse`, by Khronos's
+/// converter: a dielectric reflects 4 %, and the base colour of both parts is the same.
 double metalnessOf(const Color& diffuse, const Color& specular) {
     constexpr double kDielectric = 0.04;
     const double s = brightness(specular), left = 1 - gltfLargest(specular);
@@ -30,7 +30,7 @@ double metalnessOf(const Color& diffuse, const Color& specular) {
     return std::clamp((std::sqrt(b * b - 4 * kDielectric * c) - b) / (2 * kDielectric), 0.0, 1.0);
 }
 
-/// What an extension says of a texture, as the core of glTF has it.
+/// A reference to a texture in an extension, in the form of the core of glTF.
 tinygltf::TextureInfo textureInfo(const Value& extension, const char* key) {
     tinygltf::TextureInfo info;
     info.texCoord = 0;

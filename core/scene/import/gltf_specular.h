@@ -14,7 +14,7 @@ inline constexpr const char* kGltfSpecularGlossiness = "KHR_materials_pbrSpecula
 /// The metal of a material that is one in parts.
 struct GltfMetalParts {
     tinygltf::Material material;
-    std::optional<GltfTexture> mask;  ///< Where its green is `cutoff` or more the material is this metal.
+    std::optional<GltfTexture> mask;  ///< If its green is `cutoff` or more, the material is this metal.
     double cutoff = 0;
 };
 

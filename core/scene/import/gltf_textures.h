@@ -25,7 +25,7 @@ struct GltfTexture {
     double rotation = 0;  ///< Radians, as KHR_texture_transform has it.
 };
 
-/// What the texels of an image are, from 0 to 1 by channel.
+/// Range of the texels of an image, from 0 to 1 by channel.
 struct TexelStatistics {
     std::array<double, 3> least{}, most{}, mean{};
     std::array<double, 3> linear_mean{};  ///< Of sRGB codes, decoded.
@@ -48,11 +48,11 @@ public:
     std::optional<GltfTexture> named(const tinygltf::Value& extension, const char* key,
                                      const std::string& pointer) const;
 
-    /// Whether crt can read its image; else it is a loss.
+    /// True if crt can read its image; otherwise it is a loss.
     bool canRead(const GltfTexture& texture);
-    /// Whether its image has colours, as normal maps must.
+    /// True if its image has colours, as normal maps must.
     bool hasColors(const GltfTexture& texture);
-    /// Whether some of its image is not there. Reads the pixels.
+    /// True if some of its image is transparent. Reads the pixels.
     bool hasHoles(const GltfTexture& texture);
     /// "{texture: a.glb, image: 2}" of one that can be read; `more` are further keys: ", channel: blue".
     std::string form(const GltfTexture& texture, const std::string& more = {});

@@ -1,4 +1,4 @@
-/// What extensions of a glTF file say: values that may be missing, or of another kind than they should be.
+/// Values in extensions of a glTF file, which may be missing or of a wrong type.
 #pragma once
 
 #include "scene/gltf/gltf_model.h"

@@ -27,7 +27,7 @@ std::string extensionOf(const std::string& path) {
     return extension;
 }
 
-/// What a comment can hold.
+/// Text that a comment can hold.
 std::string inOneLine(std::string_view text) {
     constexpr std::size_t kMostBytes = 300;
     std::string line;

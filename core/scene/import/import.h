@@ -15,7 +15,7 @@ bool isModel(const std::string& path);
 /// "Mitsuba" or "pbrt", by the end of the name of a scene of theirs; empty: it is none. crt's Python package
 /// imports them.
 std::string otherRendererOf(const std::string& path);
-/// What to do with such a scene: a command.
+/// The command that converts such a scene.
 std::string importHint(const std::string& path);
 /// "Blender": what has files with this end that crt does not read, as far as they are known; else empty.
 std::string unreadFormatOf(const std::string& path);
@@ -27,11 +27,11 @@ struct ImportOptions {
 
 struct ImportedModel {
     std::string scene;                 ///< Its text.
-    std::unique_ptr<LoadedMesh> mesh;  ///< Of an OBJ or PLY: for whoever reads the scene next.
+    std::unique_ptr<LoadedMesh> mesh;  ///< For an OBJ or PLY: hints for the reader of the scene.
 };
 
-/// The text of a scene of the model, with a camera and light where it has none. What was dropped or
-/// approximated is told in one warning, and written at the top. Throws crt::Error(Scene).
+/// The text of a scene of the model, with a camera and light where it has none. One warning reports
+/// everything that was dropped or approximated, and so does a comment at the top. Throws crt::Error(Scene).
 ImportedModel importModel(GltfFiles& files, const std::string& path, const ImportOptions& options = {});
 
 }  // namespace crt

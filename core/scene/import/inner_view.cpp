@@ -65,7 +65,7 @@ public:
     }
     const Bounds& bounds() const { return nodes_[0].bounds; }
 
-    /// Whether the rays took more steps than they may, as where all triangles lie on one spot. Further ones
+    /// True if the rays took more steps than allowed, as when all triangles lie at one place. Further ones
     /// find nothing.
     bool isExhausted() const { return steps_ > kMostSteps; }
 
@@ -84,7 +84,7 @@ private:
     std::size_t build(std::size_t begin, std::size_t end);
     void visit(std::size_t number, const Vec3d& origin, const Vec3d& direction, const Vec3d& inverse,
                Hit& hit) const;
-    /// Where the ray enters the box; infinite where it does not before `limit`.
+    /// Distance at which the ray enters the box; infinite if it does not before `limit`.
     static double entry(const Bounds& bounds, const Vec3d& origin, const Vec3d& inverse, double limit);
 
     const std::vector<PaintedTriangle>& triangles_;
@@ -180,7 +180,7 @@ Materials seenFromAround(const Tree& tree) {
     return seen;
 }
 
-/// What is seen of a place.
+/// The view from a place.
 struct Place {
     Vec3d position;
     Materials seen;

@@ -1,4 +1,4 @@
-/// Where to look at a building from: a place within a model that shows more of it than all around it.
+/// Finds a camera for a building: a place inside a model that shows more of it than a view from outside.
 #pragma once
 
 #include "base/vec3d.h"

@@ -32,8 +32,8 @@ std::optional<InnerView> innerViewOf(const Mesh& mesh, double aspect) {
     return innerView(triangles, aspect);
 }
 
-/// What the lamps of an OBJ (Ke) make of a white surface within its box, roughly, where 1 is white in the
-/// image; nothing where there are none.
+/// Approximate brightness of a white surface within the box of an OBJ, lit by its emitters (Ke), where 1 is
+/// white in the image; nothing without emitters.
 std::optional<double> brightnessBy(const LoadedMesh& loaded) {
     const Mesh& mesh = loaded.mesh;
     std::vector<double> radiance;

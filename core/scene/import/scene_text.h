@@ -37,8 +37,8 @@ private:
     std::map<std::string, std::size_t> next_;  ///< The number to try first behind a name.
 };
 
-/// What a file has and its scene has not, or not quite, each with how often; and what the scene has that the
-/// file has not.
+/// Differences between a file and its scene: features that are lost or approximated, each with its count,
+/// and features that were added.
 class Losses {
 public:
     void add(const std::string& what) { ++count_[what]; }

@@ -18,9 +18,9 @@ struct MaterialFiles {
 };
 
 /// Reads the files of all mtllib statements. A name is taken as it stands; with '/' for '\'; with letters of
-/// another case; and then without its folders, beside the OBJ: each of the last three with a warning. What
-/// follows mtllib is taken as one name before it is taken apart at its blanks, because exporters do not
-/// quote blanks. Where nothing that an OBJ names is there, the MTL with the name of the OBJ serves, with a
+/// another case; and then without its folders, beside the OBJ: each of the last three with a warning. The
+/// text after mtllib is tried as one name first and then split at its blanks, because exporters do not quote
+/// blanks. Where nothing that an OBJ names is there, the MTL with the name of the OBJ serves, with a
 /// warning. A file that is missing is no error here.
 MaterialFiles readMaterialFiles(const ObjContents& obj, const std::string& obj_path);
 

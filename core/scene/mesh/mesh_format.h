@@ -1,4 +1,4 @@
-/// Which format a file has that was meant to be an OBJ.
+/// Detects the format of a file that was given as an OBJ.
 #pragma once
 
 #include <string>
@@ -9,7 +9,7 @@ namespace crt {
 /// "a PLY file", "a PNG image": by how the file begins. Empty for what may be an OBJ.
 std::string otherFormat(std::string_view content);
 
-/// Whether a text has materials where an OBJ has faces.
+/// True if a text has materials where an OBJ has faces.
 bool looksLikeMtl(std::string_view content);
 
 }  // namespace crt

@@ -209,7 +209,7 @@ private:
         failMesh("this mesh has no faces", path_);
     }
 
-    /// What crt has no place for.
+    /// Statements that crt does not support.
     std::vector<std::string> otherGeometry() const {
         std::vector<std::string> others;
         if (obj_.lines > 0) others.push_back(counted(obj_.lines, "line statement"));
@@ -330,7 +330,7 @@ private:
     bool any_faces_ = false, any_smooth_ = false;
 };
 
-/// What an OBJ says. Its text is gone when this returns.
+/// Contents of an OBJ. Its text is gone when this returns.
 ObjContents readContents(const std::string& path) {
     Stage stage("reading " + std::filesystem::path(path).filename().string());
     const std::string text = readTextFile(path, "mesh", kMostMeshBytes, {path});

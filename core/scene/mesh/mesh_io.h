@@ -15,7 +15,7 @@ namespace crt {
 
 struct ObjOptions {
     bool use_mtl = true;                ///< Reads mtllib and usemtl.
-    MtlColor color = MtlColor::Linear;  ///< What Kd, Ks and Ke are.
+    MtlColor color = MtlColor::Linear;  ///< Encoding of Kd, Ks and Ke.
     auto operator<=>(const ObjOptions&) const = default;
 };
 
@@ -25,7 +25,7 @@ struct LoadedMaterial {
     std::optional<MtlMaterial> mtl;  ///< Nothing where no material file defines the name.
 };
 
-/// What the file of a mesh brought.
+/// Contents of the file of a mesh.
 struct LoadedMesh {
     Mesh mesh;  ///< mesh.material indexes `materials` below, −1 none, or is empty; mesh.emission is empty.
     std::vector<LoadedMaterial> materials;  ///< Only those that faces use, in the order in which they do.
@@ -38,10 +38,10 @@ struct LoadedMesh {
 };
 
 /// Reads an OBJ. Throws crt::Error(Scene) with file:line for a file that is missing, has another format, has
-/// no face, or whose faces name vertices that are not there. What costs less than the file is a warning:
-/// faces of vertices that are no numbers (left out), of no area (left out, even if that leaves none), of
-/// normals that are not there or have no direction (shaded flat); names that no MTL defines; what crt has no
-/// place for. One line says what became of the materials.
+/// no face, or whose faces name vertices that are not there. Errors that do not affect the whole file are
+/// warnings: faces of vertices that are not finite (left out), of no area (left out, even if that leaves
+/// none), of normals that are not there or have no direction (shaded flat); names that no MTL defines; what
+/// crt has no place for. One line says what became of the materials.
 LoadedMesh loadObj(const std::string& path, const ObjOptions& options = {});
 
 }  // namespace crt

@@ -12,10 +12,10 @@
 
 namespace crt {
 
-/// Which of the names of a face is meant.
+/// The kind of name of a face.
 enum class PartBy { Any, Group, Object, Material };
 
-/// What a scene puts on the faces of a part; −1: nothing.
+/// The material and emission that a scene gives to the faces of a part; −1: none.
 struct PartUse {
     std::string pattern;  ///< A name, in which '*' stands for any letters and '?' for one.
     PartBy by = PartBy::Any;
@@ -41,9 +41,9 @@ public:
     /// Goes through all triangles, after which the following can be asked.
     void lookAt(const Mesh& mesh);
     const std::vector<PartUse>& uses() const { return uses_; }
-    /// Whether a triangle belongs to the part.
+    /// True if a triangle belongs to the part.
     bool used(std::size_t use) const { return used_[use]; }
-    /// Whether a triangle keeps this material of the file; yes without parts.
+    /// True if a triangle keeps this material of the file; always without parts.
     bool keeps(std::size_t own) const { return uses_.empty() || keeps_[own]; }
     bool anyMaterial() const { return any_material_; }
     bool anyEmission() const { return any_emission_; }

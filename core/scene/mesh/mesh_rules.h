@@ -1,5 +1,5 @@
-/// What readers of meshes have in common: what faces belong to, which triangles are left out, what becomes
-/// of normals, and how losses are counted.
+/// Rules that all readers of meshes share: groups of faces, triangles to leave out, normals, and the
+/// counting of losses.
 #pragma once
 
 #include "base/vec3d.h"
@@ -21,7 +21,7 @@ struct MeshLoss {
     void add(int at_line, const std::string& what) {
         if (count++ == 0) line = at_line, sentence = what;
     }
-    /// What was found behind it, in lines counted from `first_line`.
+    /// The results after it, in lines counted from `first_line`.
     void add(const MeshLoss& behind, int first_line = 0) {
         if (count == 0 && behind.count > 0) line = behind.line + first_line, sentence = behind.sentence;
         count += behind.count;

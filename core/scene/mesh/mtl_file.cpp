@@ -50,8 +50,7 @@ const std::vector<MtlKey>& mtlKeys() {
          {},
          "1 − opacity",
          "As `d`, which takes precedence if both are present. MeshLab, vcglib and OpenMVS write `Tr 1` for "
-         "opaque "
-         "surfaces, without `Ni`."},
+         "opaque surfaces, without `Ni`."},
         {"Tf",
          {"Kt"},
          "r g b, or one number",
@@ -71,8 +70,7 @@ const std::vector<MtlKey>& mtlKeys() {
          {},
          "file",
          "A measured spectrum (`.spd`, `.csv`) in place of Kd or Ks, looked up in the folder of the MTL; "
-         "clamped "
-         "beyond its ends. Known to crt only."},
+         "clamped beyond its ends. Known to crt only."},
         {"Ns",
          {},
          "exponent",
@@ -89,10 +87,8 @@ const std::vector<MtlKey>& mtlKeys() {
          "image",
          "A texture that replaces `Kd`, on faces with `vt`: sRGB for 8 and 16 bits. "
          "Looked up in the folder of the MTL, with `/` for `\\`, without its folders, and in another letter "
-         "case. "
-         "`-s`, `-o` and "
-         "`-clamp` are read. If the file cannot be read, crt warns and uses `Kd`; a black `Kd`, which "
-         "exporters write together with a texture, counts as grey 0.6."},
+         "case. `-s`, `-o` and `-clamp` are read. If the file cannot be read, crt warns and uses `Kd`; a "
+         "black `Kd`, which exporters write together with a texture, counts as grey 0.6."},
         {"map_Ka", {}, "image", "Ignored, as `Ka`."},
         {"map_Ks", {}, "image", "Left out, with a warning."},
         {"map_Ns", {}, "image", "Left out, with a warning."},

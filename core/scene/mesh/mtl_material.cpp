@@ -21,7 +21,7 @@ constexpr double kUnstatedKd = 0.6;  // As tinyobjloader and assimp assume.
 constexpr double kVisibleRoughness = 0.05;
 constexpr std::size_t kAlpha = 3;
 
-/// What `-imfchan` names.
+/// The channel of `-imfchan`.
 std::size_t channelOf(std::string_view name) {
     return name == "g" ? 1 : name == "b" ? 2 : name == "m" ? kAlpha : 0;
 }
@@ -156,7 +156,7 @@ private:
     /// Maya writes illum 4 and a white Tf for everything. Its Ni is the shader's: 1.5 in a model that came
     /// from 3ds Max.
     bool fromMaya() const { return illumIs({4}) && tf_ && isGrey(*tf_, 1.0); }
-    /// What has images is a surface: leaves and decals, whose exporters write an Ni for everything.
+    /// A material with images is a surface: leaves and decals, for which exporters also write an Ni.
     bool hasImages() const { return has("map_Kd") || has("map_d"); }
     bool lightPasses() const {
         return (opacity_.value_or(1.0) < 1.0 && !hasImages()) || filters() ||

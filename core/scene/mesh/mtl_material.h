@@ -13,13 +13,13 @@
 
 namespace crt {
 
-/// What the numbers of Kd, Ks and Ke are: linear, as Mitsuba, pbrt and Blender take them, or sRGB-encoded as
-/// colour pickers show them.
+/// Encoding of Kd, Ks and Ke: linear, as Mitsuba, pbrt and Blender take them, or sRGB-encoded as colour
+/// pickers show them.
 enum class MtlColor { Linear, Srgb };
 
 /// An image that a material names, and how it lies.
 struct MtlMap {
-    std::string file;                                  ///< It is there; nobody has looked into it.
+    std::string file;                                  ///< The file exists; its contents were not read.
     std::array<double, 6> transform{1, 0, 0, 0, 1, 0};  ///< As of Texture.
     bool clamp = false;
     std::size_t channel = 0;  ///< Of a number: red, green, blue or alpha.
@@ -52,7 +52,7 @@ public:
     void unreadable(const MtlText& material, const std::string& what);
 
     bool empty() const { return kinds_.empty(); }
-    /// Whether anything is other than the file says.
+    /// True if anything differs from the file.
     bool lossy() const {
         return !(decisions_.empty() && dropped_.empty() && unknown_.empty() && unreadable_.empty());
     }

@@ -46,8 +46,8 @@ struct NamedRun {
     std::int32_t material, group, object;
 };
 
-/// What a block of lines says, as far as it can be known without the blocks before it: lines, materials and
-/// what counts backwards are of the block alone.
+/// The contents of a block of lines, as far as they are known without the earlier blocks: lines, materials
+/// and negative indices refer to the block alone.
 struct ObjPart {
     std::vector<Vec3d> positions, normals;
     std::vector<std::array<double, 2>> uvs;
@@ -72,7 +72,7 @@ struct ObjPart {
     std::vector<Backwards> backwards;
     /// Positions that 32 bits do not hold.
     std::vector<std::pair<std::size_t, std::int64_t>> beyond;
-    std::string failure;  ///< Why it was not read beyond `failure_line`.
+    std::string failure;  ///< Reason why it was not read beyond `failure_line`.
     int failure_line = 0;
 };
 
@@ -327,7 +327,7 @@ private:
         std::int64_t position;
         int line;
     };
-    /// What comes before a part.
+    /// The numbers of elements before a part.
     struct Place {
         std::size_t positions = 0, normals = 0, uvs = 0;
         int line = 0;

@@ -33,7 +33,7 @@ struct ObjFace {
     bool operator==(const ObjFace&) const = default;
 };
 
-/// What a face and those behind it, up to the next run, belong to.
+/// Names of a face and of those after it, up to the next run.
 struct ObjRun {
     std::uint32_t first_face;  ///< In its block.
     std::int32_t material;     ///< Index into material_names; −1 none.

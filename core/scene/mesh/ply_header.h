@@ -52,7 +52,7 @@ struct PlyHeader {
     char line_end = '\n';               ///< The last character of a line.
     std::vector<PlyElement> elements;   ///< In the order of the file; no two of one name.
     std::vector<std::string> textures;  ///< Files that comments name, as MeshLab writes them.
-    std::size_t bytes = 0;              ///< Where the first element begins.
+    std::size_t bytes = 0;              ///< Offset of the first element.
     int lines = 0;
 
     const PlyElement* find(std::string_view element) const;

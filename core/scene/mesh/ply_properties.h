@@ -1,4 +1,4 @@
-/// Which properties of a PLY crt has a place for, and the values of an element by their place.
+/// The properties of a PLY that crt supports, and the values of an element by their position.
 #pragma once
 
 #include "scene/mesh/ply_reader.h"
@@ -11,7 +11,7 @@
 
 namespace crt::ply {
 
-/// What crt has a place for: numbers of vertices, and lists of faces.
+/// The properties that crt supports: numbers of vertices, and lists of faces.
 enum Role {
     kX,
     kY,

@@ -31,7 +31,7 @@ namespace {
 constexpr std::uint64_t kMostVertices = 0xfffffffeu;  // Below kNoNormal and kNoUv.
 constexpr std::size_t kRowsAtATime = std::size_t{1} << 14;
 
-/// What a block of elements cost.
+/// Losses in a block of elements.
 struct Losses {
     MeshLoss bad_positions, bad_normals, bad_uvs, bad_colors, small_faces;
     std::uint64_t flat_faces = 0, faces_without_position = 0, degenerate = 0, crossing = 0, transparent = 0;
@@ -147,7 +147,7 @@ private:
         normaliseNormals(mesh.normals);
     }
 
-    /// Of several errors the first is thrown, whoever was faster.
+    /// Of several errors the first in the file is thrown, independent of the order of threads.
     void forBlocks(const PlyBlocks& blocks, const std::function<void(std::size_t)>& read) {
         std::vector<std::optional<Error>> errors(blocks.places.size());
         parallelFor(blocks.places.size(), 1, [&](std::size_t block, std::size_t) {
@@ -396,7 +396,7 @@ private:
                                   more > 0 ? fmt::format(" and {} more", more) : "", element));
     }
 
-    /// What crt has no place for, in one line.
+    /// Properties that crt does not support, in one line.
     void sayWhatIsLeftOut() const {
         std::vector<std::string> what;
         addNames(vertex_slots_, "vertices", what);

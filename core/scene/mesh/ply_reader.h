@@ -10,8 +10,8 @@
 
 namespace crt {
 
-/// What colours of vertices are. ByType: integers sRGB-encoded, as scanners and modellers write them, floats
-/// linear, as renderers do.
+/// Encoding of colours of vertices. ByType: integers sRGB-encoded, as scanners and modellers write them,
+/// floats linear, as renderers do.
 enum class PlyColor { Srgb, Linear, ByType };
 
 struct PlyOptions {
@@ -22,8 +22,8 @@ struct PlyOptions {
 /// texture coordinates (u, v; s, t; texture_u, texture_v) and colours (red, green, blue), in any order and
 /// of any type; of faces vertex_indices, and texcoord (two for each corner, as MeshLab writes them). Throws
 /// crt::Error(Scene) for a file that is missing, has another format, is not what its header says, whose
-/// faces name vertices that are not there, or that has no face that can be seen. What costs less than the
-/// file is a warning, as of an OBJ; one line says what was left out.
+/// faces name vertices that are not there, or that has no face that can be seen. Errors that do not affect
+/// the whole file are warnings, as for an OBJ; one line says what was left out.
 LoadedMesh loadPly(const std::string& path, const PlyOptions& options = {});
 
 /// The same of a file's content, which is gone when this returns. `rows_at_a_time` changes nothing but what

@@ -23,7 +23,7 @@
 
 namespace crt {
 
-/// What is wrong with an element; goes behind "face 17".
+/// The error of an element, to follow "face 17".
 struct BadPlyRow {
     std::string what;
 };
@@ -127,7 +127,7 @@ std::uint64_t listLength(Cursor& cursor, const PlyProperty& list) {
     return static_cast<std::uint64_t>(length);
 }
 
-/// Where the elements of one kind lie: the first of every `rows_at_a_time`.
+/// Places of the elements of one kind: the first of every `rows_at_a_time`.
 struct PlyBlocks {
     const PlyElement* element = nullptr;
     std::size_t rows_at_a_time = 1;

@@ -64,7 +64,7 @@ void PointTree::remove(std::uint32_t point) {
     }
 }
 
-/// Whether an edge of the triangle has the whole box on its outer side, by more than rounding.
+/// True if an edge of the triangle has the whole box on its outer side, by more than rounding.
 bool PointTree::apart(const Node& node, const std::array<Point, 3>& triangle) const {
     for (std::size_t v = 0; v < 3; ++v) {
         const Point &a = triangle[v], &b = triangle[(v + 1) % 3];
@@ -214,7 +214,7 @@ void Triangulator::cutEars() {
     std::deque<std::pair<std::uint32_t, std::uint32_t>> waiting;
     const auto ask = [&](std::uint32_t corner) { waiting.emplace_back(corner, ++turn_of[corner]); };
     std::uint32_t cuts = 0;
-    // Where corners coincide or edges cross, one cut may free others; then all are asked anew.
+    // Where corners coincide or edges cross, one cut may free others; then all are tested again.
     constexpr int kRounds = 16;
     for (int round = 0; round < kRounds && left > 3 && (round == 0 || cuts > 0); ++round) {
         cuts = 0;

@@ -22,8 +22,8 @@ public:
     /// The points must stay where they are.
     void build(std::span<const Point> points);
     void remove(std::uint32_t point);
-    /// Whether one of those that are left lies in a triangle that is turned left, its edges included, and is
-    /// none of its corners, by number or place.
+    /// True if one of the remaining corners lies in a triangle that is turned left, its edges included, and
+    /// is none of its corners, by number or place.
     bool anyInside(std::uint32_t a, std::uint32_t b, std::uint32_t c) const;
 
 private:
@@ -65,7 +65,7 @@ private:
 
     std::vector<std::array<double, 2>> points_;
     std::vector<std::uint32_t> before_, after_;  ///< Neighbours in what is left of the polygon.
-    std::vector<std::uint32_t> ring_;            ///< What is left of it in the end.
+    std::vector<std::uint32_t> ring_;            ///< The remaining corners at the end.
     PointTree tree_;
     std::vector<PolygonTriangle> triangles_;
     std::uint64_t crossing_ = 0;

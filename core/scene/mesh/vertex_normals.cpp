@@ -153,8 +153,8 @@ private:
                 ++towards;
             std::size_t end = towards;
             while (end < edges_.size() && edges_[end].other == edges_[first].other) ++end;
-            // Sheets that are written twice, once for each side, have four triangles at an edge. Where
-            // there are many, nobody can say which belong together.
+            // Sheets that are written twice, once for each side, have four triangles at an edge. With many
+            // of them, their pairing is ambiguous.
             constexpr std::size_t kMostAtAnEdge = 8;
             if (end - first <= kMostAtAnEdge)
                 for (std::size_t i = first; i < towards; ++i)

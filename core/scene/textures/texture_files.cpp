@@ -157,7 +157,7 @@ void encodeScaled(const Texels& texels, const TexelUse& use, std::span<std::uint
     });
 }
 
-/// What floats may hold beyond a reflectance.
+/// Values of floats beyond the range of a reflectance.
 struct Odd {
     std::atomic<std::uint64_t> outside{0};
     std::atomic<std::size_t> not_finite;  ///< The first; the number of texels: none.

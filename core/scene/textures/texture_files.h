@@ -14,7 +14,7 @@
 
 namespace crt {
 
-/// How the texels of a file are read.
+/// Options for reading the texels of a file.
 struct TexelUse {
     TexelKind kind = TexelKind::Spectra;
     TexelColor color = TexelColor::Auto;    ///< Spectra. Numbers are taken as they are.

@@ -18,7 +18,7 @@
 namespace crt {
 namespace {
 
-/// What a texture needs of a mesh, that of its parts too.
+/// Requirements of a texture and of its parts on a mesh.
 struct Needs {
     bool uvs = false, colors = false, opacity = false;
 };

@@ -160,7 +160,7 @@ Json sectionSchema(const SectionSchema& section) {
 
 // ---- Markdown -------------------------------------------------------------------------------------------
 
-/// What stands before the sections of the manual.
+/// The text before the sections of the manual.
 constexpr std::string_view kIntroduction = R"(# Scene files
 
 <!-- Generated from the table in core/scene/yaml/scene_schema.cpp. Change it there, then run
@@ -268,7 +268,7 @@ Further families are folders of CSV files (`FAMILY/NAME.csv`, with the header th
 in a folder of `CRT_DATA_PATH`, whose folders, separated by `:`, are searched before those of crt.
 )";
 
-/// What stands before the variants of a family.
+/// The text before the variants of a family.
 std::string_view familyIntroduction(std::string_view family) {
     if (family == "spectrum")
         return "A function of wavelength, from 360 to 830 nm. A key that needs a spectrum takes\n\n"
@@ -352,7 +352,7 @@ std::string keyTable(const SectionSchema& section) {
     return text;
 }
 
-/// What becomes of each keyword of an MTL, from the table that its reader uses.
+/// The meaning of each keyword of an MTL, from the table that its reader uses.
 std::string mtlTable() {
     std::string text =
         "\nMaterials of an OBJ come from the files that its `mtllib` names: all of them are read, and the "
@@ -361,13 +361,12 @@ std::string mtlTable() {
         "warning. If a file is missing, the mesh loses its materials, and `material` is used instead. A "
         "material is, by the first rule that applies,\n\n"
         "1. glass (dielectric, smooth and clear), if `Ni` is above 1 and the material lets light pass: `d` "
-        "below 1, `Tr` above 0 without `d`, a `Tf` that is "
-        "neither black nor white, `illum` 6, 7 or 9, or `illum` 4 without a white `Tf`;\n"
+        "below 1, `Tr` above 0 without `d`, a `Tf` that is neither black nor white, `illum` 6, 7 or 9, or "
+        "`illum` 4 without a white `Tf`;\n"
         "2. a mirror, if `Pm` is 0.5 or more, or `illum` is 3 or 5 with Kd ≤ 0.1 and a Ks;\n"
         "3. diffuse.\n\n"
         "One line per file reports the resulting materials, the statements that were left out, and the "
-        "keywords "
-        "that are not in this table. A statement with invalid numbers counts as left out.\n\n"
+        "keywords that are not in this table. A statement with invalid numbers counts as left out.\n\n"
         "| MTL | Arguments | Meaning in crt |\n|---|---|---|\n";
     for (const MtlKey& key : mtlKeys()) {
         std::string words = fmt::format("`{}`", key.keyword);

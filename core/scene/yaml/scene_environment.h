@@ -1,4 +1,4 @@
-/// What lies around a scene: a radiance, an image or a sky.
+/// The surroundings of a scene: a radiance, an image or a sky.
 #pragma once
 
 #include "scene/scene.h"

@@ -17,7 +17,7 @@ using IsGiven = std::function<bool(const std::string&)>;
 
 /// Keys that the map below loses: those that exclude a given one, and what goes together with them. An
 /// included focal_length and its sensor give way to a fov. Of keys of which one is required the last stays,
-/// so that the contradiction is told, unless a given one takes its place.
+/// so that the contradiction is reported, unless a given one takes its place.
 std::set<std::string> givingWay(const SectionSchema& section, const IsGiven& given);
 
 /// Keys that are of no use without `key`: they go with it when it is taken away.
@@ -27,7 +27,8 @@ std::set<std::string> goingWith(const SectionSchema& section, const std::string&
 /// is one of several kinds and does not tell which.
 const SectionSchema* sectionOfMap(const KeySchema& key, const YamlNode& map, std::string_view added);
 
-/// Of a kind that is told by its first key: keys of the other kinds, which a map loses when it becomes this.
+/// For a variant that its first key selects: keys of the other variants, which a map loses when it becomes
+/// this one.
 std::set<std::string> keysOfOtherKinds(const SectionSchema& kind, const IsGiven& given);
 
 }  // namespace crt

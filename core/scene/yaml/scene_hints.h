@@ -1,5 +1,5 @@
-/// What someone meant who wrote a value as another program has it, or left a level out: the suggestions of
-/// messages beyond the nearest word.
+/// Suggestions of messages beyond the nearest word: for values in the form of another program, or with a
+/// missing level.
 #pragma once
 
 #include "scene/yaml/scene_schema.h"

@@ -33,7 +33,7 @@ void checkFirstKey(const YamlNode& root, Diagnostics& out) {
         out.error(version->key_place, "'crt' must be the first key of a scene");
 }
 
-/// What the check of the whole scene would not see, since the scene has a version of its own.
+/// Errors that the check of the merged scene would miss, since that has its own version key.
 void checkIncluded(const YamlNode& root, Diagnostics& out) {
     if (root.kind != YamlKind::Map) {
         out.error(root.place, fmt::format("an included file is a scene, which is a map; this is {}",
@@ -77,7 +77,7 @@ YamlNodePtr keyByKey(const YamlNode& below, const YamlNode& above, const std::se
     return map;
 }
 
-/// What `below` loses of a key of the scene that holds one section; nothing is excluded in the others.
+/// The keys that `below` loses to a key of the scene in one section; the other sections exclude nothing.
 std::set<std::string> lostBelow(const std::string& key, const YamlNode& above) {
     const KeySchema* schema = schemaSection("").find(key);
     const bool section = schema != nullptr && schema->kind == ValueKind::Section &&

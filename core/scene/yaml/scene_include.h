@@ -14,7 +14,7 @@ namespace crt {
 
 class SceneIncludes {
 public:
-    /// What is read is noted in `files`, what is wrong goes to `out`. Both live as long as this.
+    /// The files that are read are added to `files`, errors to `out`. Both live as long as this.
     SceneIncludes(Diagnostics& out, SceneFiles& files) : out_(out), files_(files) {}
 
     /// The tree of a scene, with everything that it includes; null when nothing usable is there. `path` is

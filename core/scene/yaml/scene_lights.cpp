@@ -120,7 +120,7 @@ void readIesBrightness(const SectionReader& section, PointLight& light) {
         scale * *std::max_element(light.ies->candela.begin(), light.ies->candela.end()) / lumens;
 }
 
-/// What the amounts of a light measure: `flux_sr` is radiant flux over radiant intensity.
+/// Quantities of a light's amounts: `flux_sr` is radiant flux over radiant intensity.
 double unitOf(const PointLight& light, std::string_view key) {
     const double flux_sr = light.type == PointLightType::Spot
                                ? spotSolidAngle_sr(light.cone_angle_deg, light.penumbra_deg)

@@ -53,7 +53,7 @@ bool isWhite(const Spectrum& s) { return s.min() == 1 && s.max() == 1; }
 struct MaterialReader::OpenPbr {
     MaterialReader& reader;
     const SectionReader& section;
-    Material like;  ///< What all its parts have in common.
+    Material like;  ///< Properties that all its parts share.
     double base_weight = 1, diffuse_roughness = 0;
     Spectrum base_color = constantSpectrum(0.8), specular_color = constantSpectrum(1);
     TextureIndex base_texture = kNoTexture;

@@ -117,7 +117,7 @@ private:
     }
 
     /// Keys that come from the command line: they do not give way to one another, so that a contradiction is
-    /// told.
+    /// reported.
     static IsGiven givenIn(const YamlNode& map) {
         return [&map](const std::string& key) {
             const YamlEntry* entry = map.find(key);
@@ -126,8 +126,8 @@ private:
         };
     }
 
-    /// Whether null takes a key away, as if the file left it out. Of keys for which null is a value it is
-    /// that value.
+    /// True if null removes a key, as if the file left it out. Of keys for which null is a value it is that
+    /// value.
     static bool isOptional(Row row) {
         return row.key != nullptr && !row.named && !row.key->required && !row.key->nullable;
     }

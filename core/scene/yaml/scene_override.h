@@ -11,7 +11,7 @@ namespace crt {
 
 /// Puts each value where its path leads. A key that is set takes the place of those that exclude it, as a
 /// scene's own does over an included one; null takes an optional key away. `sources` gets the texts that
-/// messages point into. Whether keys exist is for the check of the whole scene.
+/// messages point into. The check of the whole scene decides whether keys exist.
 void applyOverrides(YamlNodePtr& root, const std::vector<SceneOverride>& overrides,
                     std::deque<YamlSource>& sources, Diagnostics& out);
 

@@ -28,7 +28,7 @@ bool readNumeric(Diagnostics& out, const YamlNode& node, const YamlPlace& place,
         return false;
     }
     const Parsed<T> parsed = parse(node.text);
-    // Whether -1 is no whole number or just too small is the range's to say; it says it better.
+    // The range check decides whether -1 is not a whole number or just too small; its message is better.
     if (!parsed.value) {
         const Parsed<double> real = parseNumber(node.text);
         if (real.value && !key.range.contains(*real.value))

@@ -1,5 +1,5 @@
 /// A YAML map read against its section of the schema: the ground that all parts of the scene reader stand
-/// on. Whatever is wrong goes to Diagnostics and the value keeps its default, so reading always goes on.
+/// on. Errors go to Diagnostics and the value keeps its default, so reading always continues.
 #pragma once
 
 #include "base/error.h"

@@ -44,7 +44,7 @@ KeySchema outsideKey() {
                    "wavelength alone is refused, because it has no width."};
 }
 
-/// What shines in a scene: lamps and the environment.
+/// Light sources of a scene: emitters and the environment.
 KeySchema radianceKey(std::string doc) {
     return {.name = "radiance",
             .kind = Kind::Spectrum,
@@ -273,9 +273,8 @@ SectionSchema film() {
                  .doc = fmt::format(
                      "The channels of a camera or an instrument: what its sensor answers to each "
                      "wavelength. EXR files have `Response.NAME` in addition to the image: ∫ L r dλ / "
-                     "∫ r dλ, "
-                     "so that radiance 1 at all wavelengths gives 1, as it does for Y. Up to {}; names are "
-                     "letters, digits, `_` and `-`.",
+                     "∫ r dλ, so that radiance 1 at all wavelengths gives 1, as it does for Y. Up to {}; "
+                     "names are letters, digits, `_` and `-`.",
                      kMostSensorResponses)},
                 {.name = "normalise_responses",
                  .kind = Kind::Boolean,
@@ -291,8 +290,7 @@ SectionSchema spectralFilm() {
             "The spectrum of each pixel, in equal bins: mean radiance in W·m⁻²·sr⁻¹·nm⁻¹. "
             "EXR files have a channel per bin, named by its middle as Fichet et al. (2021) and pbrt-v4 do "
             "(`S0.550,000000nm`), in addition to the image and its error. Exposure, white balance and "
-            "colour space "
-            "do not change them. A bin takes 16 bytes of memory per pixel.",
+            "colour space do not change them. A bin takes 16 bytes of memory per pixel.",
             {
                 {.name = "from_nm",
                  .kind = Kind::Number,
@@ -459,8 +457,7 @@ void addSpectra(std::vector<SectionSchema>& all) {
                    {{.name = "file",
                      .required = true,
                      .doc = "A .spd or .csv of two columns, wavelength in nm and value; looked up in the "
-                            "scene's folder, then in "
-                            "CRT_MESH_PATH."},
+                            "scene's folder, then in CRT_MESH_PATH."},
                     outsideKey(),
                     scaleKey()}});
     all.push_back(
@@ -603,8 +600,7 @@ void addDielectrics(std::vector<SectionSchema>& all) {
         .doc =
             "Absorption coefficient of the inside, by the Beer–Lambert law: over a distance d the "
             "share exp(−absorption · d) is left. The mesh must be closed. Of nested bodies the "
-            "innermost absorbs, even if it is clear; behind it the outer one absorbs again. Device and "
-            "output "
+            "innermost absorbs, even if it is clear; behind it the outer one absorbs again. Where "
             "bodies overlap, the one that light entered last absorbs. Cameras (the middle of their "
             "lens) and lights may be inside bodies. Bodies may touch. Overlap them a little where "
             "other surfaces are inside two bodies that share a face, or where the faces that touch are "
@@ -625,8 +621,7 @@ void addDielectrics(std::vector<SectionSchema>& all) {
          "that meets several microfacets into reflection and transmission is an approximation that loses no "
          "energy: from inside, the roughest glass reflects more straight on, "
          "and less at grazing angles, than a random walk on Smith's surface. Where the glass "
-         "would "
-         "blur what is seen through it by less than 10⁻⁴ radians (α·|ior − 1|), crt treats it "
+         "would blur what is seen through it by less than 10⁻⁴ radians (α·|ior − 1|), crt treats it "
          "as smooth.",
          {materialType("rough_dielectric"), ior, textured(roughnessKey("smooth")), absorption,
           thinFilmKey()}});
@@ -634,11 +629,10 @@ void addDielectrics(std::vector<SectionSchema>& all) {
                    "a thin_dielectric material",
                    "A window pane made of one sheet of faces: two parallel surfaces, between which light is "
                    "reflected back and forth, each polarisation by itself. Transmitted light is not bent: "
-                   "lights "
-                   "of every kind shine through any number of panes (4096 at most), and a passage is not a "
-                   "scattering event. A normal map affects the mirrored light only. AOVs of first hits "
-                   "describe the surface that stops a ray: mostly the one behind the pane, and the pane "
-                   "itself in the share that it mirrors. A film is on one of the two surfaces.",
+                   "lights of every kind shine through any number of panes (4096 at most), and a passage is "
+                   "not a scattering event. A normal map affects the mirrored light only. AOVs of first "
+                   "hits describe the surface that stops a ray: mostly the one behind the pane, and the "
+                   "pane itself in the share that it mirrors. A film is on one of the two surfaces.",
                    {materialType("thin_dielectric"),
                     index("Refractive index of the pane relative to its surroundings."),
                     thinFilmKey()}});

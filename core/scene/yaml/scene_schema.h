@@ -19,7 +19,7 @@ enum class ValueKind {
     Section,   ///< A map described by `section`.
 };
 
-/// How many values of the kind, and in what arrangement.
+/// Number of values of the kind, and their arrangement.
 enum class ValueShape {
     One,
     List,       ///< `count_min` to `count_max` values.
@@ -28,7 +28,7 @@ enum class ValueShape {
     Map,        ///< Free names → values.
 };
 
-/// What a number may be; the bounds belong to it unless open.
+/// Range of a number; the bounds belong to it unless open.
 struct ValueRange {
     double min = -std::numeric_limits<double>::infinity();
     double max = std::numeric_limits<double>::infinity();
@@ -63,7 +63,7 @@ struct KeySchema {
     std::string doc{};
 };
 
-/// What several keys of one map have to do with each other.
+/// Relation between several keys of one map.
 struct KeyRule {
     enum class Kind { ExactlyOne, AtMostOne, Together } kind;
     std::vector<std::string> keys;
@@ -90,8 +90,8 @@ const SectionSchema& schemaSection(std::string_view name);
 /// The sections "family/…", or the one section called `family`.
 std::vector<const SectionSchema*> schemaVariants(std::string_view family);
 
-/// A variant is told by the value of its key `type`, or else by its first key being there. Which of the two
-/// a section uses.
+/// The value of the key `type` selects a variant, or else the presence of its first key. The one that a
+/// section uses.
 bool variantByType(const SectionSchema& variant);
 /// The word that picks the variant: "diffuse" of material/diffuse, "rgb" of spectrum/rgb.
 std::string variantWord(const SectionSchema& variant);

@@ -68,7 +68,7 @@ KeySchema degreesKey(std::string name, ValueRange range, double fallback, std::s
             .doc = std::move(doc)};
 }
 
-/// What sends light from a point, and of `beam` what a figure of intensity means.
+/// Emission from a point, and for `beam` the meaning of an intensity.
 std::vector<KeySchema> intensityKeys(const std::string& beam) {
     return {spectralKey("radiant_intensity", "W·sr⁻¹·nm⁻¹", "Radiant intensity" + beam + "."),
             amountKey("power_w", "W", "Radiant flux in all directions, from 360 to 830 nm."),
@@ -142,8 +142,7 @@ void addLights(std::vector<SectionSchema>& all) {
            .doc = "The IES file; looked up in the scene's folder, then in CRT_MESH_PATH."},
           vectorKey("direction",
                     "Direction of the vertical angle 0: down, for a lamp that hangs as measured; "
-                    "any length but "
-                    "0. `[0, -1, 0]` when left out."),
+                    "any length but 0. `[0, -1, 0]` when left out."),
           vectorKey("target", "Or a point there.", "scene units"),
           vectorKey("c0",
                     "Direction of the horizontal angle 0; only its part across the axis counts. Larger "
@@ -182,8 +181,7 @@ void addLights(std::vector<SectionSchema>& all) {
            .doc = "Width and height of a slit."},
           vectorKey("up",
                     "Direction of a slit's height; only its part across the light's direction counts. `[0, "
-                    "1, 0]`, "
-                    "or `[0, 0, 1]` where that is the direction, when left out."),
+                    "1, 0]`, or `[0, 0, 1]` where that is the direction, when left out."),
           spectralKey("irradiance", "W·m⁻²·nm⁻¹", "Irradiance of a plane across it."),
           amountKey("illuminance_lx", "lx", "Illuminance of a plane across it."),
           amountKey("power_w", "W", "Radiant flux through it, from 360 to 830 nm."),

@@ -84,8 +84,7 @@ void addOpenPbr(std::vector<SectionSchema>& all) {
         "materials of crt, mixed by `base_metalness`, `transmission_weight` and `coat_weight`, and all "
         "light is spectral. A metal is a `rough_conductor` that follows the F82-tint curve, clamped at 0 "
         "where a dark tint would make it negative. A glossy base is a `plastic` in the reciprocal form of "
-        "the "
-        "specification, which gives `base_color` to what comes out of the gloss; a clear one is a "
+        "the specification, which gives `base_color` to what comes out of the gloss; a clear one is a "
         "`rough_dielectric`, its `specular_weight` an index. Rough surfaces compensate the energy loss of "
         "microfacets, as elsewhere in crt. Subsurface and thin walls are refused where they would be "
         "visible, and so are features that crt's own material lacks; the message says what to write "
@@ -124,8 +123,7 @@ void addOpenPbr(std::vector<SectionSchema>& all) {
          weight("coat_weight", "0",
                 "Share of the surface that a coat lies on: a clear or tinted dielectric, like lacquer. Its "
                 "reflection is white; the layers below get the rest, and has the index `specular_ior` "
-                "relative to "
-                "the coat's (or the inverse, where that is above 1). A clear base has no coat.",
+                "relative to the coat's (or the inverse, where that is above 1). A clear base has no coat.",
                 true),
          color("coat_color", "1",
                "Transmittance of the coat at normal incidence, in and out. At grazing angles the path is "

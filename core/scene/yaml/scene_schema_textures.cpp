@@ -11,7 +11,7 @@ using namespace schema;
 
 constexpr ValueRange kTurns{-kMostUv, kMostUv, false, false};
 
-/// What texture coordinates go through, whatever they pick.
+/// Transforms of texture coordinates, for all textures.
 std::vector<KeySchema> transformKeys() {
     return {{.name = "scale",
              .kind = Kind::Number,
@@ -56,11 +56,10 @@ void addTextures(std::vector<SectionSchema>& all) {
          {{.name = "texture",
            .required = true,
            .doc = "A PNG, JPEG, TGA, EXR, Radiance HDR or PFM, by content; looked up in the scene's folder, "
-                  "then "
-                  "in CRT_MESH_PATH. Or a glTF file or GLB, with `image`. Colours of an EXR with alpha, "
-                  "which are multiplied by it, are divided by it. EXPOSURE of an HDR, gAMA of a PNG and the "
-                  "EXIF orientation of a JPEG are ignored, with a warning where they would change the "
-                  "picture."},
+                  "then in CRT_MESH_PATH. Or a glTF file or GLB, with `image`. Colours of an EXR with "
+                  "alpha, which are multiplied by it, are divided by it. EXPOSURE of an HDR, gAMA of a PNG "
+                  "and the EXIF orientation of a JPEG are ignored, with a warning where they would change "
+                  "the picture."},
           {.name = "image",
            .kind = Kind::Integer,
            .range = {0, 1e9, false, false},
@@ -91,8 +90,7 @@ void addTextures(std::vector<SectionSchema>& all) {
            .kind = Kind::Number,
            .range = {0, 1, false, false},
            .doc = "Where the key wants a number: texels below it are 0, those from it on are 1, "
-                  "before "
-                  "`factor`."},
+                  "before `factor`."},
           {.name = "filter",
            .kind = Kind::Choice,
            .choices = {"bilinear", "nearest"},

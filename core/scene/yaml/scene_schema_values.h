@@ -1,4 +1,4 @@
-/// What the parts of the table of keys have in common: ranges, defaults as YAML, keys of every kind of map.
+/// Shared elements of the table of keys: ranges, defaults as YAML, keys of every kind of map.
 #pragma once
 
 #include "scene/scene.h"

@@ -19,7 +19,7 @@ Spectrum scaled(Spectrum spectrum, double factor) {
 
 namespace {
 
-/// How many spectra may each be the name of the next.
+/// Limit of the length of a chain of named spectra.
 constexpr std::size_t kDeepestSpectrum = 64;
 
 bool takesColors(SpectrumUse use) { return use != SpectrumUse::Index && use != SpectrumUse::Response; }
@@ -197,7 +197,7 @@ std::optional<Spectrum> SpectrumReader::resolveForm(const SectionReader& form, S
             if (form.read("ref", name)) return resolveName(name, form.place("ref"), use);
         }
     } catch (
-        const Error& e) {  // What the spectrum's maths refuses; it does not know the place in the scene.
+        const Error& e) {  // Errors of the spectrum's maths, which does not know the place in the scene.
         if (e.kind() == ErrorKind::Internal) throw;
         form.error(word, sentenceWithPlace(e));
     }
@@ -241,7 +241,7 @@ std::optional<Spectrum> SpectrumReader::file(const SectionReader& form) {
     if (!path) return std::nullopt;
     files_.note(*path);
     if (outside != Outside::Error) return readSpectrumFile(*path, outside);
-    // Read as if nothing were asked beyond the data first, so that a broken file is told from one that is
+    // Read first without a requirement beyond the data, which distinguishes a broken file from one that is
     // only too short.
     const Spectrum clamped = readSpectrumFile(*path, Outside::Clamp);
     if (outside_wrong) return clamped;

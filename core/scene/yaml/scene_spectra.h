@@ -16,7 +16,7 @@ namespace crt {
 /// Every value times the factor.
 Spectrum scaled(Spectrum spectrum, double factor);
 
-/// What a spectrum is for. An rgb colour means another spectrum as a reflectance than as a light.
+/// Purpose of a spectrum. An rgb colour means another spectrum as a reflectance than as a light.
 enum class SpectrumUse { Reflectance, Emission, Index, White, Absorption, Response };
 
 class SpectrumReader {

@@ -1,4 +1,4 @@
-/// What a film keeps of the spectrum: film.spectral and film.responses.
+/// The spectral data of a film: film.spectral and film.responses.
 #pragma once
 
 #include "scene/spectral_film.h"

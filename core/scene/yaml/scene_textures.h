@@ -23,13 +23,13 @@ public:
     TextureReader(Diagnostics& out, SceneFiles& files, SpectrumReader& spectra, GltfFiles& gltf,
                   Scene& scene);
 
-    /// Whether the value under `key` is written as a texture.
+    /// True if the value under `key` is written as a texture.
     static bool isTexture(const SectionReader& section, std::string_view key);
 
-    /// The texture under `key`, put into the scene. Nothing when it is wrong, which is told.
+    /// The texture under `key`, put into the scene. Nothing if it is wrong, which is reported.
     std::optional<TextureIndex> read(const SectionReader& section, std::string_view key, TexelKind kind);
 
-    /// The image of a `normal_map`, put into the scene. kNoTexture when it is wrong, which is told.
+    /// The image of a `normal_map`, put into the scene. kNoTexture if it is wrong, which is reported.
     TextureIndex readNormalMap(const SectionReader& form);
 
     /// An image of a material file. Throws crt::Error(Scene) where it cannot be read.

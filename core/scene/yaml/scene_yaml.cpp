@@ -281,7 +281,7 @@ Scene parse(const std::string& yaml, const std::string& name, const std::string&
 
 constexpr std::string_view kStandardInput = "-";
 
-/// What messages and outputs are called after.
+/// The name of the scene in messages and outputs.
 std::string nameOf(const std::string& path) { return path == kStandardInput ? "stdin" : path; }
 
 [[noreturn]] void cannotRead(const std::string& path, std::string_view why) {

@@ -32,7 +32,7 @@ struct YamlSource {
     bool command_line = false;  ///< One line, so messages leave line and column out.
     bool included = false;      ///< By a scene, in which not all of it need be used.
     int rank = 0;               ///< Messages come in this order: the scene itself, then what it includes.
-    std::string directory{};    ///< Where relative names in it are looked up; empty: beside the scene.
+    std::string directory{};    ///< The folder for relative names in it; empty: that of the scene.
 
 private:
     /// Of long lines, which programs write: characters before every kCounted-th byte.
@@ -87,8 +87,8 @@ public:
                std::string note = {});
     bool failed() const { return !errors_.empty(); }
     std::size_t count() const { return errors_.size() + not_kept_; }
-    /// Whether to look for the nearest of so many names: the first errors get a suggestion, however many
-    /// names there are, but not a hundred thousand errors over a hundred thousand names.
+    /// True if the nearest of this number of names should be searched: the first errors get a suggestion,
+    /// however many names there are, but not a hundred thousand errors over a hundred thousand names.
     bool worthSuggesting(std::size_t names) const { return count() * names <= 1'000'000; }
     /// Throws crt::Error(Scene) with all errors in the order of the text, if there are any.
     void throwIfFailed() const;

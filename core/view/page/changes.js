@@ -1,4 +1,4 @@
-// Wishes on their way to the program: each arrives, once, in the order of the gestures.
+// Changes on their way to the program: each arrives, once, in the order of the gestures.
 const noChanges = () => ({
   page: Array.from(crypto.getRandomValues(new Uint8Array(16)), (byte) => byte.toString(16)).join("."),
   queue: [],    // Not yet confirmed, the oldest first.
@@ -31,12 +31,12 @@ function merged(one, other) {
   return value === null ? null : { [key]: value };
 }
 
-/// Adds a wish. One that only continues the last is added to that, unless it is on its way.
-function change(wish) {
+/// Adds a change. One that only continues the last is added to that, unless it is on its way.
+function change(wanted) {
   const { queue } = changes;
-  const both = queue.length > changes.sent ? merged(queue[queue.length - 1], wish) : null;
+  const both = queue.length > changes.sent ? merged(queue[queue.length - 1], wanted) : null;
   if (both) queue[queue.length - 1] = both;
-  else queue.push(wish);
+  else queue.push(wanted);
   if (!sending) sendChanges();
 }
 
@@ -69,7 +69,7 @@ async function sendSome() {
   mine.version = JSON.parse(text).version;
 }
 
-/// Once all wishes have arrived.
+/// Once all changes have arrived.
 async function allArrived() {
   while (sending) await sleep(10);
 }

@@ -31,7 +31,8 @@ def is_foreign(path):
 def import_scene(path, parameters=None):
     """A scene of Mitsuba 3 (.xml) or pbrt-v4 (.pbrt, .pbrt.gz) as an Imported.
 
-    `parameters` is a dict of values for the $names of Mitsuba's scenes. What crt has not is listed, with the
+`parameters` is a dict of values for the $names of Mitsuba's scenes. Unsupported features are listed, with
+the
     nearest that it has in its place; nothing that is listed is an error. Errors are crt.Error of kind SCENE
     with file, line and column: what is no scene, files that are not there, and numbers that make none.
     """

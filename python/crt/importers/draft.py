@@ -11,7 +11,7 @@ from . import matrices, shapes
 from .losses import Losses
 
 MIRROR = matrices.scaling(-1, 1, 1)
-# What YAML and crt would take for something else than a name.
+# Names that YAML and crt would read as something else.
 NO_NAMES = {"true", "false", "null", "yes", "no", "on", "off", "y", "n", "nan", "inf", "from_mtl"}
 BLACK = {"type": "diffuse", "reflectance": 0}
 
@@ -28,7 +28,8 @@ class Thing:
 
 
 class Draft:
-    """What importers add to. `mirrored`: the other program's image is that of the mirrored world, which crt
+    """The scene that importers add to. `mirrored`: the other program's image is that of the mirrored world,
+    which crt
     gets then: x is -x."""
 
     def __init__(self, path):

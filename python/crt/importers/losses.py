@@ -94,7 +94,7 @@ def reading(path):
     """A context in which every exception becomes a crt.Error of kind SCENE with file, line and column."""
     token = _reading.set(_Reading(Place(str(path), 1)))
     try:
-        with np.errstate(all="ignore"):  # What is not finite is refused in the end.
+        with np.errstate(all="ignore"):  # Numbers that are not finite are refused in the end.
             yield
     except Error:
         raise

@@ -66,7 +66,7 @@ class Importer:
             self.losses.add(plugin.values[name][2], f"'{name}' of {plugin}")
         plugin.left.clear()
 
-    # How it is rendered.
+    # The film, the sampler and the integrator.
 
     def integrator(self, plugin):
         inner = plugin.one("integrator")
@@ -315,7 +315,7 @@ class Importer:
             return
         matrix, geometry = found
         places = [placement @ matrix for placement in placements]
-        # What crt reads as v is 1 - v in Mitsuba's spheres, and in its OBJ files unless that is off.
+        # crt's v is 1 - v in Mitsuba's spheres, and in its OBJ files unless that is off.
         flip_v = plugin.kind == "sphere" or (
             plugin.kind == "obj" and plugin.get("flip_tex_coords", True) is not False)
         # Before version 2 a shape with a medium and without a bsdf lets light pass; later it is diffuse.

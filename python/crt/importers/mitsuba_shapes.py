@@ -83,7 +83,7 @@ class Shapes:
         return {} if has_normals else {"normals": "smooth", "crease_angle_deg": 180}
 
     def mirrors(self, plugin):
-        """Does `to_world` mirror? Mitsuba applies it to the vertices of a mesh. Where these have no normals,
+        """Does `to_world` mirror? Mitsuba applies it to the vertices of a mesh. If these have no normals,
         their order says where the outside is, and a mirror turns that around."""
         return bool(np.linalg.det(plugin.transform()[:3, :3]) < 0)
 

@@ -205,7 +205,7 @@ class Reader:
         name = self.attribute(element, "name", "")
         return snake(name) if self.version < (2, 0) else name
 
-    # What stands beside plugins and values.
+    # Elements next to plugins and values.
 
     def other(self, tag):
         return self.search_path if tag == "path" else getattr(self, tag)
@@ -220,7 +220,7 @@ class Reader:
         self.folders.append(self.file(element.place, self.attribute(element, "value")))
 
     def ref(self, plugin, element, trail):
-        # What it names may come later.
+        # The referenced element may come later.
         name = self.name_of(element)
         element.attributes["id"] = self.attribute(element, "id")
         plugin.parts.append((name, element))

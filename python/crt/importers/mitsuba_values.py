@@ -51,7 +51,7 @@ class Values:
         self.has_uvs, self.has_colors = has_uvs, has_colors
         self.uv = FLIP_V if flip_v else np.eye(3)
 
-    # What stands as the value of a parameter: a plugin, or a value of its own.
+    # The value of a parameter: a plugin, or a plain value.
 
     def reflectance(self, plugin, name, default=0.5):
         """A spectrum or a texture of crt, from 0 to 1."""

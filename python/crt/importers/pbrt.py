@@ -59,7 +59,7 @@ class Importer:
             self.losses.add(found.values[name][2], f"'{name}' of {found}")
         found.left.clear()
 
-    # How it is rendered.
+    # The film, the sampler and the integrator.
 
     def film(self):
         film, sampler = self.setting("Film", "rgb"), self.setting("Sampler", "zsobol")

@@ -21,7 +21,7 @@ OF_CATEGORY = ("shape", "light", "material", "medium", "texture")
 
 @dataclasses.dataclass
 class Graphics:
-    """What AttributeBegin keeps and AttributeEnd restores."""
+    """The state that AttributeBegin saves and AttributeEnd restores."""
 
     matrix: np.ndarray = dataclasses.field(default_factory=matrices.identity)
     at_start: bool = True
@@ -161,7 +161,7 @@ class State:
     def do_TransformTimes(self, text, place):
         text.numbers("TransformTimes", 2)
 
-    # What is kept and restored.
+    # The state that is saved and restored.
 
     def begin(self, kind, place):
         if len(self.stack) > 10000:
@@ -203,7 +203,7 @@ class State:
     def do_ColorSpace(self, text, place):
         self.graphics.color_space = text.string("ColorSpace")
 
-    # How it is rendered.
+    # The film, the sampler and the integrator.
 
     def setting(self, text, place, directive):
         self.settings[directive] = text.parameters(directive.lower(), text.string(directive), place)
@@ -253,7 +253,7 @@ class State:
                             "pbrt-v4 converts it", large=True)
         self.version_3 = True
 
-    # What is there.
+    # The objects of the scene.
 
     def described(self, text, place, kind, directive, category):
         made = text.parameters(kind, text.string(directive), place)

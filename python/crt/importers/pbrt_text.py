@@ -82,7 +82,7 @@ class Text:
         return found
 
     def values(self):
-        """What follows the name of a parameter: a list of texts, or an array of numbers."""
+        """The value after the name of a parameter: a list of texts, or an array of numbers."""
         token = self.next()
         if token is None:
             refuse(self.place(len(self.text)), "a parameter has no value: the file ends")

@@ -109,7 +109,8 @@ class Values:
         return made
 
     def light(self, parameters, name, scale):
-        """The spectrum of a light. Whatever its own size, its luminance is `scale`; of a colour, times
+        """The spectrum of a light. Its luminance is `scale`, independent of its own scale; of a colour,
+        times
         that."""
         made = self.form(parameters, name, "zero") if parameters.has(name) else None
         if made is None:
@@ -121,7 +122,7 @@ class Values:
             return spectra.scaled(made, max(scale, 0)) if own is None else 0.0
         return spectra.scaled(made, max(scale, 0) / own)
 
-    # What may be a texture.
+    # A value that may be a texture.
 
     def reflectance(self, parameters, name, default):
         if not parameters.has(name):

@@ -6,7 +6,7 @@ import sys
 
 
 def load(folder):
-    """The package in `folder` under a name of its own, so that its files import each other."""
+    """The package in `folder` under a unique name, so that its files import each other."""
     spec = importlib.util.spec_from_file_location("crt_report", folder / "__init__.py",
                                                   submodule_search_locations=[str(folder)])
     package = importlib.util.module_from_spec(spec)

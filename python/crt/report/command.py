@@ -35,7 +35,7 @@ def write_whole(path, text):
             file.write(text)
         mask = os.umask(0)
         os.umask(mask)
-        os.chmod(name, 0o666 & ~mask)  # mkstemp lets nobody else read.
+        os.chmod(name, 0o666 & ~mask)  # mkstemp makes the file unreadable for other users.
         os.replace(name, path)
     except BaseException:
         os.unlink(name)

@@ -59,7 +59,7 @@ class Drawing:
 
 
 def wrapped(label, width):
-    """Lines of at most so many letters, broken at blanks."""
+    """Lines of at most this number of letters, broken at blanks."""
     lines = [""]
     for word in label.split(" "):
         if lines[-1] and len(lines[-1]) + 1 + len(word) > width:
@@ -362,7 +362,7 @@ def start_budget(scene):
 
 
 def verdicts(scene, margin, confidence):
-    """What the verdicts rest on: the bias of each colour's mean, with the verdict's own interval."""
+    """Evidence for the verdicts: the bias of each colour's mean, with the verdict's own interval."""
     subjects = [s for s in scene["subjects"] if s["fit"]["relative_mean_bias_rgb"]]
     if not subjects:
         return None

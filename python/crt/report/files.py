@@ -1,4 +1,4 @@
-"""What a run has written, read and known to be of this format."""
+"""Reads the files of a run and checks their format."""
 
 import base64
 import dataclasses

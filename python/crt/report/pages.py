@@ -1,4 +1,4 @@
-"""What the pages have in common: the templates and their filters."""
+"""Shared parts of the pages: the templates and their filters."""
 
 import pathlib
 import re

@@ -1,5 +1,5 @@
-"""How figures are drawn: matplotlib, its colours exchanged for the page's, so that they follow light, dark
-and print; ticks that never collide; SVG with text as text."""
+"""Draws figures: matplotlib, its colours exchanged for the page's, so that they follow light, dark and
+print; ticks that never collide; SVG with text as text."""
 
 import dataclasses
 import io
@@ -35,12 +35,12 @@ WIDTH = 5.0  # Inches of 72 units; text of 10 units stays legible where a page i
 
 @dataclasses.dataclass
 class Figure:
-    """A figure, drawn: `svg` for a page, `file` as a file of its own."""
+    """A drawn figure: `svg` for a page, `file` as a separate file."""
 
     name: str     # Letters, digits and '-'; of the page's figures each has another.
     title: str
     caption: str
-    description: str  # What it shows, for those who do not see it.
+    description: str  # A description, for readers who cannot see it.
     svg: str = ""
     file: str = ""
 
@@ -51,13 +51,13 @@ def series(place):
 
 
 def canvas(height, width=WIDTH):
-    """(figure, axes) of so many inches. In style()."""
+    """(figure, axes) of this size in inches. In style()."""
     figure = Canvas(figsize=(width, height), layout="constrained")
     return figure, figure.add_subplot()
 
 
 def legend_below(figure, handles, lines, columns=1):
-    """A legend of so many lines below the axes, for which the figure grows."""
+    """A legend of this number of lines below the axes, for which the figure grows."""
     height, own = figure.get_figheight(), LEGEND_LINE * lines
     figure.set_figheight(height + own)
     figure.get_layout_engine().set(rect=(0, own / (height + own), 1, height / (height + own)))
@@ -170,6 +170,6 @@ def spread_labels(figure, axis):
 
 
 def touching(axis):
-    """Whether two labels of a drawn axis overlap, or have no room of 3 units between them."""
+    """True if two labels of a drawn axis overlap, or have no room of 3 units between them."""
     boxes = [label.get_window_extent() for label in axis.get_ticklabels() if label.get_text()]
     return any(a.padded(3).overlaps(b) for a, b in zip(boxes, boxes[1:]))

@@ -11,7 +11,7 @@ UNITS_OF_SECONDS = ((0.9995e-3, 1e-6, " µs"), (0.9995, 1e-3, " ms"), (299.5, 1,
 
 
 def known(value):
-    """Whether `value` is a finite number; what JSON has as null is none."""
+    """True if `value` is a finite number; null in JSON is not."""
     return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
 
 
@@ -35,7 +35,7 @@ def percent(value, digits=3):
 
 
 def unit_of_seconds(value):
-    """(size, name) of the unit in which so many seconds are read best."""
+    """(size, name) of the unit that suits this number of seconds best."""
     return next((size, name) for below, size, name in UNITS_OF_SECONDS if abs(value) < below)
 
 
@@ -64,7 +64,7 @@ def bounds(estimate, size=1, digits=3, unit=""):
 
 def value_and_bounds(estimate, kind, digits=3):
     """(value, interval) of an estimate as texts in one unit; `kind` is "seconds", "percent" or "number".
-    What is not known is a dash without interval."""
+An unknown value is a dash without interval."""
     value = estimate["value"] if estimate else None
     if not known(value):
         return DASH, ""

@@ -74,7 +74,7 @@ def power(tick):
 
 
 def deviations(cases, backend):
-    """How far every figure lies from what was expected, a row for each group; None where no case has any."""
+    """Deviations of all figures from their expected values, one row per group; None if no case has any."""
     found = {}
     for case in cases:
         known = [(o["deviation"], o["verdict"]) for o in case["outcomes"] if o["deviation"] is not None]

@@ -7,9 +7,9 @@
 
 namespace crt {
 
-class Silence {
+class NullListener {
 public:
-    Silence() : listener_([](LogLevel, std::string_view) {}, LogLevel::Off), scope_(listener_) {}
+    NullListener() : listener_([](LogLevel, std::string_view) {}, LogLevel::Off), scope_(listener_) {}
 
 private:
     const Listener listener_;

@@ -1,4 +1,4 @@
-#include "judge/converge/contestant.h"
+#include "judge/converge/configuration_run.h"
 #include "film/resolve.h"
 
 #include "backend/loader.h"
@@ -58,7 +58,8 @@ std::optional<double> clockMhz() {
 
 }  // namespace
 
-Contestant::Contestant(Key key, LoadScene load, const Reference* reference, const IntegratorOptions& options)
+ConfigurationRun::ConfigurationRun(Key key, LoadScene load, const Reference* reference,
+                                   const IntegratorOptions& options)
     : load_(std::move(load)), options_(options), reference_(reference), tests_(1, 1, 3) {
     configuration_.key = std::move(key);
     configuration_.threads = options.threads;
@@ -66,7 +67,7 @@ Contestant::Contestant(Key key, LoadScene load, const Reference* reference, cons
     seed_ = scene_.sampler.seed;
 }
 
-void Contestant::open() {
+void ConfigurationRun::open() {
     session_.reset();
     scene_ = load_();
     const Stopwatch opening;
@@ -75,7 +76,7 @@ void Contestant::open() {
     start_seconds_ = scene_.parse_seconds + opening.seconds();
 }
 
-void Contestant::describe(const CompiledScene& compiled) {
+void ConfigurationRun::describe(const CompiledScene& compiled) {
     paths_ = {scene_.sampler.type != SamplerType::Sobol, brightestPathOf(compiled)};
     const CrtBackendReport report = session_->report();
     Configuration& c = configuration_;
@@ -97,8 +98,8 @@ void Contestant::describe(const CompiledScene& compiled) {
     tests_ = stats::Replicates(compiled.header().width, compiled.header().height, 3);
 }
 
-/// What a film amounts to after so many samples.
-Row Contestant::look(const Film& film, std::uint32_t replicate, bool last) {
+/// Measures a film after this number of samples.
+Row ConfigurationRun::look(const Film& film, std::uint32_t replicate, bool last) {
     Row row;
     row.key = configuration_.key;
     row.seed = scene_.sampler.seed;
@@ -144,7 +145,7 @@ Row Contestant::look(const Film& film, std::uint32_t replicate, bool last) {
     return row;
 }
 
-void Contestant::keepPicture(const Film& film, const Image& image, double mean_luminance) {
+void ConfigurationRun::keepPicture(const Film& film, const Image& image, double mean_luminance) {
     last_image_ = image;
     last_error_ = {image.width, image.height, std::vector<float>(film.counts.size())};
     const LuminanceVariance variance(film);
@@ -156,7 +157,7 @@ void Contestant::keepPicture(const Film& film, const Image& image, double mean_l
 }
 
 /// The same seed and samples are the same bits as that replicate's look was.
-void Contestant::renderPicture(std::uint32_t replicate, std::uint64_t samples) {
+void ConfigurationRun::renderPicture(std::uint32_t replicate, std::uint64_t samples) {
     scene_.sampler.seed = seed_ + 1 + replicate;
     const CompiledScene compiled = session_->compile(scene_);
     session_->group().setScene(compiled);
@@ -187,13 +188,13 @@ void Contestant::prepare() {
     start_waits_ = true;
 }
 
-void Contestant::restart() {
+void ConfigurationRun::restart() {
     if (start_waits_) return;
     open();
     prepare();
 }
 
-StoredReplicate Contestant::stored(std::uint32_t replicate) const {
+StoredReplicate ConfigurationRun::stored(std::uint32_t replicate) const {
     StoredReplicate stored;
     for (const auto& [samples, planes] : looks_)
         if (const auto plane = planes.find(replicate); plane != planes.end())
@@ -203,7 +204,7 @@ StoredReplicate Contestant::stored(std::uint32_t replicate) const {
     return stored;
 }
 
-void Contestant::restore(std::uint32_t replicate, const StoredReplicate& stored) {
+void ConfigurationRun::restore(std::uint32_t replicate, const StoredReplicate& stored) {
     for (const auto& [samples, plane] : stored.looks) looks_[samples][replicate] = plane;
     samples_reached_ = std::max(samples_reached_, stored.looks.back().first);
     tests_.add(std::vector<double>(stored.rgb.begin(), stored.rgb.end()));
@@ -216,7 +217,7 @@ void Contestant::restore(std::uint32_t replicate, const StoredReplicate& stored)
     last_error_ = {configuration_.width, configuration_.height, stored.standard_error};
 }
 
-bool Contestant::replicate(std::uint32_t replicate, std::uint64_t most_samples, double seconds,
+bool ConfigurationRun::replicate(std::uint32_t replicate, std::uint64_t most_samples, double seconds,
                            const std::function<void(const Row&)>& found, const std::function<bool()>& stop) {
     scene_.sampler.seed = seed_ + 1 + replicate;
     const CompiledScene compiled = session_->compile(scene_);
@@ -259,7 +260,7 @@ bool Contestant::replicate(std::uint32_t replicate, std::uint64_t most_samples, 
     return true;
 }
 
-void Contestant::finish(std::uint64_t map_samples) {
+void ConfigurationRun::finish(std::uint64_t map_samples) {
     if (last_image_.pixels.empty()) return;
     if (reference_ != nullptr && !reference_->fold_rgb.empty() && tests_.count() >= 2) {
         stats::Replicates eighths(configuration_.width, configuration_.height, 3);
@@ -272,7 +273,7 @@ void Contestant::finish(std::uint64_t map_samples) {
     fillMaps(map_samples);
 }
 
-void Contestant::fillMaps(std::uint64_t samples) {
+void ConfigurationRun::fillMaps(std::uint64_t samples) {
     Configuration& c = configuration_;
     c.maps.samples = samples;
     c.maps.image = last_image_;
@@ -304,12 +305,12 @@ void Contestant::fillMaps(std::uint64_t samples) {
                 .error};
 }
 
-std::uint64_t commonSamples(const std::vector<std::unique_ptr<Contestant>>& contestants,
+std::uint64_t commonSamples(const std::vector<std::unique_ptr<ConfigurationRun>>& runs,
                             const std::string& scene) {
     std::uint64_t samples = std::numeric_limits<std::uint64_t>::max();
-    for (const auto& contestant : contestants)
-        if (contestant->key().scene == scene && contestant->samplesReached() > 0)
-            samples = std::min(samples, contestant->samplesReached());
+    for (const auto& run : runs)
+        if (run->key().scene == scene && run->samplesReached() > 0)
+            samples = std::min(samples, run->samplesReached());
     return samples;
 }
 

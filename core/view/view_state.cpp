@@ -1,8 +1,8 @@
-#include "view/board.h"
+#include "view/view_state.h"
 
 namespace crt {
 
-void Board::update(const std::function<void(Status&)>& change) {
+void ViewState::update(const std::function<void(Status&)>& change) {
     {
         const std::lock_guard lock(mutex_);
         change(status_);
@@ -11,7 +11,7 @@ void Board::update(const std::function<void(Status&)>& change) {
     news_.notify_all();
 }
 
-void Board::show(Picture picture) {
+void ViewState::show(Picture picture) {
     {
         const std::lock_guard lock(mutex_);
         picture.number = ++pictures_;
@@ -21,7 +21,7 @@ void Board::show(Picture picture) {
     news_.notify_all();
 }
 
-void Board::close() {
+void ViewState::close() {
     {
         const std::lock_guard lock(mutex_);
         closed_ = true;
@@ -29,7 +29,7 @@ void Board::close() {
     news_.notify_all();
 }
 
-Board::Sight Board::waitBeyond(std::uint64_t version, std::chrono::milliseconds longest) {
+ViewState::Copy ViewState::waitBeyond(std::uint64_t version, std::chrono::milliseconds longest) {
     std::unique_lock lock(mutex_);
     looked_at_ = std::chrono::steady_clock::now();
     // A version from before a restart of the program is not valid.
@@ -38,7 +38,7 @@ Board::Sight Board::waitBeyond(std::uint64_t version, std::chrono::milliseconds 
     return {version_, status_, picture_, closed_};
 }
 
-bool Board::isWatched() {
+bool ViewState::isWatched() {
     constexpr std::chrono::seconds kLooks{30};
     const std::lock_guard lock(mutex_);
     return std::chrono::steady_clock::now() - looked_at_ < kLooks;

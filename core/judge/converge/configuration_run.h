@@ -18,21 +18,21 @@
 
 namespace crt::converge {
 
-class Contestant {
+class ConfigurationRun {
 public:
     using LoadScene = std::function<Scene()>;
 
     /// Loads the scene and the backend. Throws crt::Error when it cannot run.
-    Contestant(Key key, LoadScene load, const Reference* reference, const IntegratorOptions& options);
+    ConfigurationRun(Key key, LoadScene load, const Reference* reference, const IntegratorOptions& options);
 
     /// Compiles the scene and renders one sample that does not count: all that is needed before the first
     /// replicate, and timed as its start.
     void prepare();
-    /// Starts from the beginning, and times that: start-up has noise as rendering has, and a time with both
-    /// in it is known only by starts of their own for several replicates. Nothing where a start waits for
-    /// its replicate already.
+    /// Starts from the beginning, and times that: start-up is noisy like rendering, and a time that includes
+    /// both needs separate starts for several replicates. Nothing where a start waits for its replicate
+    /// already.
     void restart();
-    /// What the last start took.
+    /// Times of the last start.
     double startSeconds() const { return start_seconds_; }
 
     /// Renders seed number `replicate` to N = 1, 2, 4 … and gives each look to `found`, until
@@ -89,12 +89,12 @@ private:
     Plane last_error_;          ///< The image's own standard error, relative to its mean.
 };
 
-/// The most samples that all contestants of a scene reached: maps of the same samples can be compared.
-std::uint64_t commonSamples(const std::vector<std::unique_ptr<Contestant>>& contestants,
+/// The most samples that all runs of a scene reached: maps of the same samples can be compared.
+std::uint64_t commonSamples(const std::vector<std::unique_ptr<ConfigurationRun>>& runs,
                             const std::string& scene);
 
-/// What becomes known when replicates can be compared: (R − 1)/R · mean (I_r − mean of the others)²,
-/// into the rows.
+/// Writes the error that follows from a comparison of replicates: (R − 1)/R · mean (I_r − mean of the
+/// others)², into the rows.
 void fillBetweenReplicates(std::vector<Row>& rows, const Key& key,
                            const std::map<std::uint64_t, std::map<std::uint32_t, LookPlane>>& looks);
 

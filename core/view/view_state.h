@@ -27,7 +27,7 @@ struct ColourScale {
 
 /// Eight-bit colours for a screen.
 struct Picture {
-    std::uint64_t number = 0;  ///< Given by the Board.
+    std::uint64_t number = 0;  ///< Given by the ViewState.
     std::uint32_t width = 0, height = 0;
     std::vector<std::uint8_t> rgba;  ///< [height][width][4], top row first.
     std::uint64_t samples = 0;       ///< Per pixel.
@@ -69,7 +69,7 @@ struct Status {
     std::string tev;                 ///< Its result; empty: it was not requested.
 };
 
-class Board {
+class ViewState {
 public:
     /// Lets `change` change the status, and wakes all waiting threads.
     void update(const std::function<void(Status&)>& change);
@@ -77,15 +77,15 @@ public:
     /// Ends all waits, now and later.
     void close();
 
-    struct Sight {
+    struct Copy {
         std::uint64_t version = 0;
         Status status;
         std::shared_ptr<const Picture> picture;  ///< Null: there is none yet.
         bool closed = false;
     };
     /// The state, once it is newer than `version`, or else after the time.
-    Sight waitBeyond(std::uint64_t version, std::chrono::milliseconds longest);
-    Sight now() { return waitBeyond(0, {}); }
+    Copy waitBeyond(std::uint64_t version, std::chrono::milliseconds longest);
+    Copy now() { return waitBeyond(0, {}); }
     /// True if a page has requested the state within the last seconds.
     bool isWatched();
 
