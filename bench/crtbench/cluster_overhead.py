@@ -1,6 +1,6 @@
-"""What a Dask cluster on one machine costs beside one plain render of the same samples: wall and processor
-seconds, in turn, and whether the bits are the same. The same processes that render an equal share each,
-of which no film is sent or added, show what processes cost without crt.distributed. Prints one table;
+"""Measures the cost of a Dask cluster on one machine against one plain render of the same samples: wall and
+processor seconds, in turn, and whether the bits are the same. The same processes that render an equal share
+each, of which no film is sent or added, show what processes cost without crt.distributed. Prints one table;
 --write replaces its section of docs/results.
 
 Where a machine's speed changes from minute to minute, so do the ratios of wall times. The last column does

@@ -1,4 +1,4 @@
-"""How far a backend's arithmetic carries: sweeps over sizes, gaps, places, fields of view and solid angles,
+"""The limits of a backend's arithmetic: sweeps over sizes, gaps, places, fields of view and solid angles,
 each to where it ends, with every backend that runs here. Rays are
 counted, nothing is timed: it may run on a busy machine. --rows takes what stability_sweep printed on other
 machines, with "backend", and "machine" in words, added to each line, and the number of rays asked for as

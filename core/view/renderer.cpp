@@ -7,7 +7,7 @@
 #include "base/stopwatch.h"
 #include "compile/change_view.h"
 #include "render/brightest_path.h"
-#include "view/silence.h"
+#include "view/null_listener.h"
 
 #include <algorithm>
 #include <new>

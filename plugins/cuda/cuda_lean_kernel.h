@@ -15,17 +15,17 @@ namespace crt::cuda {
 using plugin::Entry;
 using plugin::KernelSpec;
 
-/// Whether it has the stacks of a tree's traversal.
+/// True if it has the stacks of a tree's traversal.
 bool traverses(const KernelSpec& spec);
 
 /// The whole text that NVRTC compiles: the host's text of kernel/schedule/wavefront.h, then kernels.cu.
 std::string kernelText(const std::string& wavefront_text);
 
-/// How many blocks a multiprocessor should hold at once, in the order of trying: more hide latency better,
-/// but leave each thread fewer registers. The first that spills at most kSpillBytesAllowed wins; the last is
-/// not judged. A few spilled values cost less than a fourth block gains (docs/results/cuda.md); a fifth
-/// gains where there is no tree to traverse (docs/decisions/0041-instruction-cache.md); a kernel that only
-/// traces is best with seven (docs/decisions/0042-wavefront.md).
+/// Numbers of blocks that a multiprocessor should hold at once, in the order of trying: more hide latency
+/// better, but leave each thread fewer registers. The first that spills at most kSpillBytesAllowed wins; the
+/// last is not judged. A few spilled values cost less than a fourth block gains (docs/results/cuda.md); a
+/// fifth gains where there is no tree to traverse (docs/decisions/0041-instruction-cache.md); a kernel that
+/// only traces is best with seven (docs/decisions/0042-wavefront.md).
 std::vector<int> blocksPerMultiprocessor(const KernelSpec& spec);
 /// Of all stores and loads in the code of a kernel.
 constexpr std::uint32_t kSpillBytesAllowed = 128;
@@ -39,7 +39,7 @@ std::vector<std::string> nvrtcOptions(int arch, const KernelSpec& spec, int bloc
 plugin::KernelCache::Key cacheKey(const std::string& text, int arch, const KernelSpec& spec,
                                   const std::string& compiler, const std::string& driver_version);
 
-/// What a kernel takes on the device, as the assembler reports it (--ptxas-options=-v).
+/// Resources of a kernel on the device, as the assembler reports them (--ptxas-options=-v).
 struct ResourceUse {
     std::uint32_t registers = 0;
     std::uint32_t stack_bytes = 0;  ///< Per thread; includes what is spilled.

@@ -84,7 +84,7 @@ void MaterialReader::checkInsides(std::int32_t whole, const YamlPlace& place) co
         }
 }
 
-/// Of what an openpbr material is mixed of, too, which has no names.
+/// Also of the unnamed parts of an openpbr material.
 bool MaterialReader::transmits(const Material& part) const {
     const auto index = static_cast<std::int32_t>(&part - scene_.materials.data());
     if (part.type != MaterialType::Mix || parts_.contains(index)) return part.transmits();

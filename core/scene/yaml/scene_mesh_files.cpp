@@ -15,7 +15,8 @@
 
 namespace crt {
 
-/// How an object wants the file of its mesh; `material` is the value of the key, empty where it is left out.
+/// Options of an object for the file of its mesh; `material` is the value of the key, empty where it is left
+/// out.
 MeshReader::MeshUse MeshReader::readMeshUse(const SectionReader& object, const std::string& material) {
     MeshUse use;
     use.file.ply = object.has("ply");

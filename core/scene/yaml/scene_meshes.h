@@ -53,7 +53,7 @@ public:
     void finish() const;
 
 private:
-    /// Which normals the mesh of an object has.
+    /// Source of the normals of an object's mesh.
     struct NormalsUse {
         enum class Source { File, Smooth, Flat } source = Source::File;
         double crease_angle_deg = 60;
@@ -70,7 +70,7 @@ private:
         auto operator<=>(const FileUse&) const = default;
     };
 
-    /// What an object wants of its file.
+    /// Options of an object for its file.
     struct MeshUse {
         FileUse file;
         std::vector<PartUse> parts;
@@ -117,7 +117,7 @@ private:
         std::uint64_t triangles = 0, primitives = 0;
     };
     std::map<std::string, WithoutArea> without_area_;  ///< By glTF file.
-    /// Which mesh of the scene a file's went to, and the materials that it had there.
+    /// The mesh of the scene that a file became, and its materials there.
     struct TakenMesh {
         std::uint32_t mesh;
         std::vector<std::int32_t> material;

@@ -49,7 +49,7 @@ bool isWhite(const Spectrum& s) { return s.min() == 1 && s.max() == 1; }
 
 }  // namespace
 
-/// What the keys say, and materials made of it.
+/// The values of the keys, and the materials made of them.
 struct MaterialReader::OpenPbr {
     MaterialReader& reader;
     const SectionReader& section;
@@ -239,7 +239,7 @@ void MaterialReader::OpenPbr::setColor(Material& part) const {
     part.reflectance = scaled(base_color, base_weight);
 }
 
-/// What is seen through a rough coat is seen through it twice.
+/// Light passes a rough coat twice, in and out.
 void MaterialReader::OpenPbr::setRoughness(Material& part, bool coated) const {
     part.roughness = roughness.value;
     part.roughness_texture = roughness.texture;
