@@ -1,5 +1,6 @@
-// What bench/run paper measures is right: the processor's sums, boxes and sweeps, and the kernels, played by
-// threads of the host (the program itself sees on every GPU that its results are those of the processor).
+// The programs that bench/run paper measures are right: the processor's sums, boxes and sweeps, and the
+// kernels, played by threads of the host (on every GPU the program itself compares its results with those of
+// the processor).
 #include "catch.h"
 
 #include <algorithm>

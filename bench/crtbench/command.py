@@ -1,4 +1,4 @@
-"""What the commands of bench/run have in common."""
+"""Shared parts of the commands of bench/run."""
 import pathlib
 import sys
 

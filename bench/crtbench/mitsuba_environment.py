@@ -1,4 +1,4 @@
-"""What the comparisons with Mitsuba 3 need beside crt: a Python with mitsuba, numpy and PyYAML, and an LLVM
+"""The environment of the comparisons with Mitsuba 3: a Python with mitsuba, numpy and PyYAML, and an LLVM
 that Mitsuba's compiler accepts. Both are put into out/ when they are missing; nothing of them is ever part
 of the product. The measurement then runs under that Python."""
 
@@ -95,7 +95,7 @@ def add_python_option(parser):
 
 
 def under_mitsuba(arguments):
-    """Starts bench/run anew under a Python that has mitsuba, unless this one is it."""
+    """Starts bench/run again under a Python that has mitsuba, unless this one is it."""
     os.environ["DRJIT_LIBLLVM_PATH"] = llvm_library()
     if READY not in os.environ:
         python = python_with_mitsuba(arguments.python)

@@ -1,4 +1,4 @@
-"""What a measurement leaves behind: all of it in out/bench (NAME.md for people, NAME.json for programs, both
+"""The results of a measurement: all of it in out/bench (NAME.md for people, NAME.json for programs, both
 with the machine and the build), and what crt claims by it in its section of a page in docs/results."""
 
 import datetime

@@ -1,4 +1,4 @@
-"""How fluent `crt view` is: the time from its start to the first picture and to the first whole one;
+"""Measures `crt view`: the time from its start to the first picture and to the first whole one;
 pictures a second while the image converges, and while a hand turns the camera.
 
     bench/run view                                  the Cornell box at 1280 x 720 by the best backend

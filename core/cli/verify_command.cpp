@@ -25,7 +25,7 @@ struct Request {
     IntegratorOptions integrator;
 };
 
-/// An option that the suite's program reads, by its long name. What reads it here only checks it.
+/// An option that the suite's program reads, by its long name. crt only checks it.
 Option passedOn(Option option, Request& to) {
     const std::string name = option.names.substr(option.names.rfind("--"));
     option.read = [name, flag = option.placeholder.empty(), check = std::move(option.read),
@@ -86,7 +86,10 @@ OptionGroup output(Request& to) {
           .help = "write verify.json and the page verify.html (made by Python) there",
           .read = {},
           .completion = {Completion::Kind::Folder}},
-         {.names = "-q,--quiet", .placeholder = {}, .help = "print only failures and the summary", .read = {}},
+         {.names = "-q,--quiet",
+          .placeholder = {},
+          .help = "print only failures and the summary",
+          .read = {}},
          {.names = "--markdown", .placeholder = {}, .help = "print docs/stability.md instead", .read = {}},
          {.names = "--figures",
           .placeholder = "FILE",

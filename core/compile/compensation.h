@@ -1,5 +1,5 @@
-/// What rough surfaces give back of the light that their microfacets lose
-/// (kernel/materials/compensation.h): tables of the losses, worked out before rendering.
+/// Tables of the energy that microfacets lose, which rough surfaces give back
+/// (kernel/materials/compensation.h). They are made before rendering.
 #pragma once
 
 #include "compile/blob_writer.h"

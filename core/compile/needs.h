@@ -1,4 +1,5 @@
-/// What a kernel needs for a scene, as bits of kernel/dialect/features.h, and what it can leave out and why.
+/// The features that a kernel needs for a scene, as bits of kernel/dialect/features.h, and the reasons for
+/// those that it can leave out.
 #pragma once
 
 #include "compile/materials.h"

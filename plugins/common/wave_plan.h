@@ -1,4 +1,5 @@
-/// Which kernels the waves of a scene need, and who of them shades what (kernel/schedule/wavefront.h).
+/// The kernels that the waves of a scene need, and the materials that each of them shades
+/// (kernel/schedule/wavefront.h).
 #pragma once
 
 #include "kernel_spec.h"

@@ -1,4 +1,4 @@
-/// How NVRTC compiles the lean kernel for one scene: text, options, and the key under which it is cached.
+/// The lean kernel for one scene, compiled by NVRTC: text, options, and the key under which it is cached.
 #pragma once
 
 #include "cuda_nvrtc.h"

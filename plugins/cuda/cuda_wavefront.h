@@ -1,4 +1,4 @@
-/// Paths advanced by kernels of their own for tracing and for shading (kernel/schedule/wavefront.h).
+/// Paths advanced by separate kernels for tracing and for shading (kernel/schedule/wavefront.h).
 #pragma once
 
 #include "cuda_device.h"

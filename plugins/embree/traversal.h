@@ -1,6 +1,6 @@
 /// Rays through a Tree, eight boxes or triangles at a time. Boxes cull, conservatively, as those of
 /// kernel/geometry/boxes.h do; triangles are tested by the operations of crt_intersect_corners, each in a
-/// lane of its own, so that hits are the same bits as on every other backend.
+/// separate lane, so that hits are the same bits as on every other backend.
 #pragma once
 
 #include "embree_tree.h"

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What a mutant says becomes of a file, and what is said where it does not fit."""
+"""Applies mutants to files, and checks the messages of those that do not fit."""
 
 import pathlib
 import sys

@@ -6,7 +6,7 @@
     tests/rooms/check_rooms.py --draw           the picture of docs/architecture.md
     tests/rooms/check_rooms.py --write          puts that picture there
 
-What is checked: only CMakeLists.txt and rooms lie directly in core/; every header lies in a room; every
+The checks: only CMakeLists.txt and rooms lie directly in core/; every header lies in a room; every
 source file of a room is in its target; every include of another room's header follows the arrows; no target
 links a room outside crt_room(); an include root holds the headers of its own room alone;
 docs/architecture.md has the picture that --draw makes. """

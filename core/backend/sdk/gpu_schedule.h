@@ -13,11 +13,11 @@ namespace crt {
 /// mirrors without roulette. Nothing can interrupt a launch: only between launches can a render stop.
 inline bool mayOutlastLaunch(std::uint32_t max_depth) { return max_depth > 1u << 16; }
 
-/// Whether tracing and shading should be kernels of their own, paths sorted by the kind of material that
-/// they have met (kernel/schedule/wavefront.h), rather than one kernel that takes each path to its end.
-/// Where there are several kinds, or one of many instructions, a warp otherwise runs the code of all of
-/// them for a few lanes each (docs/decisions/0042-wavefront.md, with what was measured). Paths without end
-/// are taken a vertex a launch, too.
+/// True if tracing and shading should be separate kernels, with paths sorted by the kind of material at
+/// their hit (kernel/schedule/wavefront.h), rather than one kernel that takes each path to its end. Where
+/// there are several kinds, or one of many instructions, a warp otherwise runs the code of all of them for a
+/// few lanes each (docs/decisions/0042-wavefront.md has the measurements). Paths without end are taken a
+/// vertex a launch, too.
 inline bool wantsWavefront(std::uint64_t features, std::uint32_t max_depth) {
     constexpr std::uint64_t kLong = CRT_FEATURE_ROUGH_CONDUCTOR | CRT_FEATURE_ROUGH_DIELECTRIC |
                                     CRT_FEATURE_PLASTIC | CRT_FEATURE_CLEARCOAT | CRT_FEATURE_FUZZ |

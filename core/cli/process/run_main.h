@@ -5,7 +5,7 @@
 
 namespace crt {
 
-/// Runs `body` and returns its exit code. Messages go to standard error. What it throws becomes one message
+/// Runs `body` and returns its exit code. Messages go to standard error. An exception becomes one message
 /// and an exit code; so does standard output that could not be written.
 int runMain(const std::function<int()>& body);
 

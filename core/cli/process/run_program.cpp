@@ -14,7 +14,7 @@ extern char** environ;
 namespace crt {
 namespace {
 
-/// What exec takes; it lives as long as `words`.
+/// Arguments for exec; they live as long as `words`.
 std::vector<char*> pointersTo(std::vector<std::string>& words) {
     std::vector<char*> pointers;
     for (std::string& word : words) pointers.push_back(word.data());

@@ -168,9 +168,9 @@ void ConfigurationRun::renderPicture(std::uint32_t replicate, std::uint64_t samp
     keepPicture(film, image, stats::meanLuminance(looks_.at(samples).at(replicate)));
 }
 
-/// What only the very first sample pays, such as an OpenCL driver that makes machine code late, belongs to
+/// Costs of the very first sample alone, such as an OpenCL driver that makes machine code late, belong to
 /// the start and not to a replicate.
-void Contestant::warmUp(const CompiledScene& compiled) {
+void ConfigurationRun::warmUp(const CompiledScene& compiled) {
     const Stopwatch start;
     session_->group().render({.first_sample = 0, .sample_count = 1});
     configuration_.stages.first_sample = start.seconds();
@@ -178,7 +178,7 @@ void Contestant::warmUp(const CompiledScene& compiled) {
     session_->group().setScene(compiled);
 }
 
-void Contestant::prepare() {
+void ConfigurationRun::prepare() {
     const Stopwatch setup;
     const CompiledScene compiled = session_->compile(scene_);
     session_->group().setScene(compiled);

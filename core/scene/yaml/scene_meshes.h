@@ -20,7 +20,7 @@
 
 namespace crt {
 
-/// What was read so far of a scene that its text may multiply.
+/// Counts of what the text of a scene may multiply, and their limits.
 struct SceneRoom {
     ExpansionLimit limit;
     std::uint64_t placements = 0, triangles = 0;

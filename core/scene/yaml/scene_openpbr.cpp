@@ -1,5 +1,5 @@
 // The part of MaterialReader that reads openpbr materials (OpenPBR Surface 1.1): they become crt's own,
-// mixed as the specification says. What crt has not is refused where it would be seen.
+// mixed as the specification says. Parameters that crt lacks are refused where they would be visible.
 #include "scene/light_units.h"
 #include "scene/yaml/scene_materials.h"
 
