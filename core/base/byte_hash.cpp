@@ -5,25 +5,23 @@
 #define XXH_INLINE_ALL
 #include <xxhash.h>
 
-#include <new>
-
 namespace crt {
 
-ByteHash::ByteHash() : state_(XXH3_createState()) {
-    if (!state_) throw std::bad_alloc();
-    XXH3_128bits_reset(state_.get());
-}
+struct ByteHash::State {
+    XXH3_state_t xxh3;
+};
+
+ByteHash::ByteHash() : state_(std::make_unique<State>()) { XXH3_128bits_reset(&state_->xxh3); }
+ByteHash::~ByteHash() = default;
 
 // The state of 64 and of 128 bits is one; only the digests differ.
-void ByteHash::add(const void* bytes, std::size_t size) { XXH3_128bits_update(state_.get(), bytes, size); }
+void ByteHash::add(const void* bytes, std::size_t size) { XXH3_128bits_update(&state_->xxh3, bytes, size); }
 
-std::uint64_t ByteHash::digest64() const { return XXH3_64bits_digest(state_.get()); }
+std::uint64_t ByteHash::digest64() const { return XXH3_64bits_digest(&state_->xxh3); }
 
 std::string ByteHash::digits128() const {
-    const XXH128_hash_t hash = XXH3_128bits_digest(state_.get());
+    const XXH128_hash_t hash = XXH3_128bits_digest(&state_->xxh3);
     return fmt::format("{:016x}{:016x}", hash.high64, hash.low64);
 }
-
-void ByteHash::Free::operator()(XXH3_state_s* state) const { XXH3_freeState(state); }
 
 }  // namespace crt

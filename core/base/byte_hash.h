@@ -6,23 +6,23 @@
 #include <memory>
 #include <string>
 
-struct XXH3_state_s;
-
 namespace crt {
 
 class ByteHash {
 public:
     ByteHash();
+    ~ByteHash();
+    ByteHash(const ByteHash&) = delete;
+    ByteHash& operator=(const ByteHash&) = delete;
+
     void add(const void* bytes, std::size_t size);
     std::uint64_t digest64() const;
     /// XXH3-128, 32 hex digits.
     std::string digits128() const;
 
 private:
-    struct Free {
-        void operator()(XXH3_state_s* state) const;
-    };
-    std::unique_ptr<XXH3_state_s, Free> state_;
+    struct State;  // Of a library that only byte_hash.cpp includes.
+    std::unique_ptr<State> state_;
 };
 
 }  // namespace crt
