@@ -15,6 +15,7 @@
 #include "film/error_estimate.h"
 #include "film/pooled_variance.h"
 #include "render/brightest_path.h"
+#include "render/device_film.h"
 #include "scene/yaml/scene_yaml.h"
 
 #include <fmt/format.h>
@@ -67,7 +68,7 @@ public:
         ranges_.add(range);
     }
     Film film() {
-        Film film({compiled_.width, compiled_.height, compiled_.channels, compiled_.aovs});
+        Film film(filmShapeOf(compiled_));
         integrator_.readFilm(film);
         film.samples = ranges_;
         return film;

@@ -46,10 +46,10 @@ inline CompiledScene changed(const std::function<void(Scene&)>& change) {
     return compiled(scene);
 }
 inline std::uint64_t featuresOf(const std::function<void(Scene&)>& change) {
-    return changed(change).features;
+    return changed(change).header().features;
 }
 inline const CrtScene& headerOf(const CompiledScene& c) {
-    return *reinterpret_cast<const CrtScene*>(c.data());
+    return c.header();
 }
 
 inline bool sameBytes(const CompiledScene& a, const CompiledScene& b) {

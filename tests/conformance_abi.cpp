@@ -77,11 +77,11 @@ struct Target {
     CrtFilmView view{};
 
     explicit Target(const crt::CompiledScene& compiled)
-        : sums(16 * 12 * compiled.channels * 2), counts(16 * 12) {
+        : sums(16 * 12 * compiled.header().channels * 2), counts(16 * 12) {
         view.struct_size = sizeof(view);
         view.width = 16;
         view.height = 12;
-        view.channels = compiled.channels;
+        view.channels = compiled.header().channels;
         view.sums = sums.data();
         view.counts = counts.data();
     }
@@ -182,7 +182,7 @@ TEST_CASE("set_scene clears the film, render adds, the report counts", "[abi]") 
         CHECK(report.closest_rays >= report.paths);
         CHECK(std::strlen(report.device) > 0);
         CHECK(std::strlen(report.kernel) > 0);
-        CHECK((report.kernel_features & compiled.features) == compiled.features);
+        CHECK((report.kernel_features & compiled.header().features) == compiled.header().features);
     }
     CHECK(raw.progress_calls > 0);
 }

@@ -703,7 +703,7 @@ void storeHashes(const std::string& path, const std::map<std::string, std::strin
 
 TEST_CASE("the scenes have together every feature bit", "[bits]") {
     std::uint64_t together = 0;
-    for (const Case& c : kCases) together |= crt::compileScene(sceneOf(c), kAllAovs).features;
+    for (const Case& c : kCases) together |= crt::compileScene(sceneOf(c), kAllAovs).header().features;
     INFO("no scene needs " << crt::featureNames(CRT_FEATURES_ALL & ~together));
     CHECK(together == CRT_FEATURES_ALL);
 }
@@ -760,7 +760,7 @@ TEST_CASE("a kernel with everything in it gives the bits of the lean one", "[bit
         const crt::Film with_lean = render(backend(), n.scene, lean, &of_lean);
         CHECK(differingPixels(with_lean, render(backend(), n.scene, full, &of_full)) == 0);
         CHECK(of_full.kernel_features == CRT_FEATURES_ALL);
-        const std::uint64_t needed = crt::compileScene(n.scene, 0).features;
+        const std::uint64_t needed = crt::compileScene(n.scene, 0).header().features;
         CHECK((needed & ~of_lean.kernel_features) == 0);
         // Otherwise one kernel was compared with itself.
         if (n.plain && leanKernels()) CHECK(of_lean.kernel_features != of_full.kernel_features);

@@ -86,7 +86,7 @@ inline u32 unhash(u32 x) {
 inline CrtContext contextOf(const crt::CompiledScene& compiled) {
     CrtContext ctx{};
     ctx.blob = compiled.data();
-    ctx.scene = reinterpret_cast<const CrtScene*>(compiled.data());
+    ctx.scene = &compiled.header();
     return ctx;
 }
 

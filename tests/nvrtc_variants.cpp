@@ -108,9 +108,9 @@ void addMask(std::uint64_t mask, const std::string& name, Variants& variants) {
 }
 
 void addScene(const crt::CompiledScene& scene, const std::string& name, Variants& variants) {
-    const auto* const header = reinterpret_cast<const crt::kernel::CrtScene*>(scene.data());
-    if (!crt::wantsWavefront(scene.features, header->max_depth))
-        return add({Entry::Render, scene.features}, name, variants);
+    const crt::kernel::CrtScene& header = scene.header();
+    if (!crt::wantsWavefront(header.features, header.max_depth))
+        return add({Entry::Render, header.features}, name, variants);
     for (const KernelSpec& kernel : crt::plugin::planWave(scene.data()).kernels) add(kernel, name, variants);
 }
 

@@ -15,7 +15,7 @@
 using namespace compile_test;
 
 TEST_CASE("the mask names kinds, never values", "[compile]") {
-    const std::uint64_t base = compiled(litFloor()).features;
+    const std::uint64_t base = compiled(litFloor()).header().features;
     CHECK(base == (CRT_FEATURE_SOBOL | CRT_FEATURE_BRUTE_FORCE | CRT_FEATURE_DIFFUSE |
                    CRT_FEATURE_AREA_LIGHT | CRT_FEATURE_NEE | CRT_FEATURE_REPLICATES));
     Random random(41);
@@ -42,7 +42,7 @@ TEST_CASE("the mask names kinds, never values", "[compile]") {
 }
 
 TEST_CASE("every feature bit is set by some scene, and by nothing else", "[compile]") {
-    const std::uint64_t base = compiled(litFloor()).features;
+    const std::uint64_t base = compiled(litFloor()).header().features;
     const auto differs = [&](std::uint64_t added, std::uint64_t removed,
                              const std::function<void(Scene&)>& change) {
         const std::uint64_t mask = featuresOf(change);
@@ -268,10 +268,10 @@ TEST_CASE("every feature bit is set by some scene, and by nothing else", "[compi
         s.film.spectral.bins = {400, 700, 30};
         s.integrator.type = crt::IntegratorType::Normals;
     });
-    seen |= compiled(litFloor(), crt::kAovDepth).features;
-    CHECK(compiled(litFloor(), crt::kAovDepth).features == (base | CRT_FEATURE_AOV));
+    seen |= compiled(litFloor(), crt::kAovDepth).header().features;
+    CHECK(compiled(litFloor(), crt::kAovDepth).header().features == (base | CRT_FEATURE_AOV));
     // The film keeps these itself; the kernel need not know.
-    CHECK(compiled(litFloor(), crt::kAovVariance | crt::kAovSamples).features == base);
+    CHECK(compiled(litFloor(), crt::kAovVariance | crt::kAovSamples).header().features == base);
     seen |= differs(CRT_FEATURE_TABLE, 0, [](Scene& s) { s.emissions[0].radiance[5] *= 2; });
     CHECK(seen == CRT_FEATURES_ALL);
 
@@ -285,8 +285,9 @@ TEST_CASE("every feature bit is set by some scene, and by nothing else", "[compi
     // But the albedo is asked for.
     Scene flat = litFloor();
     flat.integrator.max_depth = 0;
-    CHECK(compiled(flat, crt::kAovAlbedo).features == ((base | CRT_FEATURE_AOV) & ~CRT_FEATURE_NEE));
-    CHECK(compiled(flat, crt::kAovNormal).features ==
+    CHECK(compiled(flat, crt::kAovAlbedo).header().features ==
+          ((base | CRT_FEATURE_AOV) & ~CRT_FEATURE_NEE));
+    CHECK(compiled(flat, crt::kAovNormal).header().features ==
           ((base | CRT_FEATURE_AOV) & ~(CRT_FEATURE_NEE | CRT_FEATURE_DIFFUSE)));
     differs(CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_TABLE, CRT_FEATURE_DIFFUSE | CRT_FEATURE_NEE,
             [](Scene& s) {

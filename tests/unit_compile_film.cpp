@@ -239,7 +239,7 @@ TEST_CASE("AOVs take channels in order, and only those that are asked for", "[co
         return compiled(scene, aovs);
     };
     // The variance of a film of one sequence is that of its samples; of one with replicates, theirs.
-    CHECK(single(0).channels == CRT_CHANNELS_BASE + 1);
+    CHECK(single(0).header().channels == CRT_CHANNELS_BASE + 1);
     CHECK(headerOf(single(0)).square_channel == CRT_CHANNELS_BASE);
     Scene sixteen = litFloor();
     sixteen.sampler.replicates = 16;
@@ -247,19 +247,19 @@ TEST_CASE("AOVs take channels in order, and only those that are asked for", "[co
     CHECK(headerOf(replicates).replicate_shift == 4);
     CHECK(headerOf(replicates).square_channel == 0);
     CHECK(headerOf(replicates).replicate_channel == CRT_CHANNELS_BASE);
-    CHECK(replicates.channels == CRT_CHANNELS_BASE + 15);
+    CHECK(replicates.header().channels == CRT_CHANNELS_BASE + 15);
     // Each behind the one before it, in the order of the list, which is that of film files.
     const CompiledScene all = compiled(sixteen, ~0u);
     CHECK(headerOf(all).albedo_channel == CRT_CHANNELS_BASE);
     CHECK(headerOf(all).normal_channel == CRT_CHANNELS_BASE + 3);
     CHECK(headerOf(all).depth_channel == CRT_CHANNELS_BASE + 6);
     CHECK(headerOf(all).replicate_channel == CRT_CHANNELS_BASE + 7);
-    CHECK(all.channels == CRT_CHANNELS_MAX - 1);
+    CHECK(all.header().channels == CRT_CHANNELS_MAX - 1);
     const CompiledScene depth = single(crt::kAovDepth);
     CHECK(headerOf(depth).albedo_channel == 0);
     CHECK(headerOf(depth).depth_channel == CRT_CHANNELS_BASE + 1);
     CHECK(headerOf(depth).replicate_channel == 0);
-    CHECK(depth.channels == CRT_CHANNELS_BASE + 2);
+    CHECK(depth.header().channels == CRT_CHANNELS_BASE + 2);
 }
 
 TEST_CASE("bins and responses are the last channels of a film, and leave the others where they were",
@@ -271,11 +271,11 @@ TEST_CASE("bins and responses are the last channels of a film, and leave the oth
     const CompiledScene spectral = compiled(scene, crt::kAovDepth);
     CHECK(plain.spectral_channels == 0);
     CHECK(spectral.spectral_channels == 31);
-    CHECK(spectral.channels == plain.channels + 31);
+    CHECK(spectral.header().channels == plain.header().channels + 31);
     CHECK(headerOf(spectral).depth_channel == headerOf(plain).depth_channel);
     CHECK(headerOf(spectral).replicate_channel == headerOf(plain).replicate_channel);
     const CrtSpectralFilm film = listOf<CrtSpectralFilm>(spectral, headerOf(spectral).spectral_film).at(0);
-    CHECK(film.channel == plain.channels);
+    CHECK(film.channel == plain.header().channels);
     CHECK(film.bins == 30);
     CHECK(film.first == 40);
     CHECK(film.per_nm == 0.1f);

@@ -219,7 +219,7 @@ TEST_CASE("the matrices of the camera put points where its pixels see them", "[d
     // The ray of a film position is what core/compile/settings.cpp makes of it: corner + x · step_x + y ·
     // step_y.
     const CompiledScene compiled = compileScene(scene, 0);
-    const kernel::CrtCamera& rays = reinterpret_cast<const kernel::CrtScene*>(compiled.data())->camera;
+    const kernel::CrtCamera& rays = compiled.header().camera;
     for (const auto& [x, y] : {std::pair{0.0, 0.0}, {64.0, 0.0}, {0.0, 48.0}, {20.5, 40.25}}) {
         Vec3d p{};
         for (std::size_t k = 0; k < 3; ++k)

@@ -43,8 +43,9 @@ struct Run {
 
     /// What the scene and so many rows of its film take.
     std::string roomFor(std::uint32_t rows) const {
-        return std::to_string(compiled.size_bytes + std::uint64_t{rows} * kWidth *
-                                                        (16 * std::uint64_t{compiled.channels} + 8));
+        const std::uint64_t channels = compiled.header().channels;
+        return std::to_string(compiled.size_bytes +
+                              std::uint64_t{rows} * kWidth * (16 * channels + 8));
     }
     Film empty() const { return Film(filmShapeOf(compiled)); }
     Film film() {
@@ -103,8 +104,7 @@ TEST_CASE("a film in bands is the film of a device with room for all of it", "[d
     CHECK(samples + run.group.shares().size() > 29);
 
     // The scene is whole again, and so is the next film where there is room.
-    const auto& header = *reinterpret_cast<const kernel::CrtScene*>(run.compiled.data());
-    CHECK(run.compiled.height == kHeight);
+    const kernel::CrtScene& header = run.compiled.header();
     CHECK(header.height == kHeight);
     CHECK(header.crop_y == 5);
     ::unsetenv("CRT_FAKE_MEMORY");
@@ -127,7 +127,7 @@ TEST_CASE("a scene that has no room is refused with its own numbers", "[device_f
         CHECK(error.lacksMemory());
         CHECK_THAT(error.what(), Contains("the scene needs " + std::to_string(run.compiled.size_bytes)));
     }
-    CHECK(run.compiled.height == kHeight);
+    CHECK(run.compiled.header().height == kHeight);
 }
 
 TEST_CASE("memory that others take in the middle makes more bands", "[device_film]") {

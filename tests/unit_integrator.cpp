@@ -48,15 +48,12 @@ CompiledScene makeScene(std::uint32_t width, std::uint32_t height, std::uint32_t
     scene.blob.resize((sizeof(header) + 63) / 64);
     scene.size_bytes = sizeof(header);
     std::memcpy(scene.blob.data(), &header, sizeof(header));
-    scene.width = width;
-    scene.height = height;
-    scene.channels = channels;
-    scene.aovs = aovs;
     return scene;
 }
 
 Film filmOf(const CompiledScene& scene) {
-    return Film(FilmShape{scene.width, scene.height, scene.channels, scene.aovs});
+    const kernel::CrtScene& header = scene.header();
+    return Film(FilmShape{header.width, header.height, header.channels, header.aovs});
 }
 
 double expected(std::uint32_t x, std::uint32_t y, std::uint32_t channel, std::uint64_t first,

@@ -132,7 +132,7 @@ TEST_CASE("a backend that brings its own acceleration structure gets no BVH, and
     CHECK(without.build_seconds == 0);
     CHECK(headerOf(without).nodes.count == 0);
     CHECK(headerOf(without).accelerator == CRT_ACCELERATOR_BVH);
-    CHECK(without.features == with.features);
+    CHECK(without.header().features == with.header().features);
     CHECK(without.hash == with.hash);
     CHECK(without.size_bytes < with.size_bytes);
     const auto left_out = [](const CompiledScene& c) {

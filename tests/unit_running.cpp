@@ -190,7 +190,7 @@ struct FakeRun {
 
     FakeRun() { devices.setScene(); }
     Film emptyFilm() const {
-        return Film({compiled.width, compiled.height, compiled.channels, compiled.aovs});
+        return Film(filmShapeOf(compiled));
     }
 };
 

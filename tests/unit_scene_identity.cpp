@@ -297,7 +297,7 @@ TEST_CASE("the hash is not that of what only finds hits sooner", "[compile]") {
          {crt::Accelerator::None, crt::Accelerator::Aabb, crt::Accelerator::Auto}) {
         const CompiledScene other = withTree(accelerator);
         CHECK(other.hash == tree.hash);
-        if (accelerator == crt::Accelerator::None) CHECK(other.features != tree.features);
+        if (accelerator == crt::Accelerator::None) CHECK(other.header().features != tree.header().features);
     }
 }
 
@@ -308,7 +308,7 @@ TEST_CASE("a better tree and a smaller kernel leave the hash alone", "[compile]"
         return s;
     }();
     CompiledScene c = compiled(scene);
-    auto& header = *reinterpret_cast<CrtScene*>(c.blob.data());
+    CrtScene& header = c.header();
     REQUIRE(header.nodes.count > 0);
     std::vector<std::array<float, 9>> positions(header.triangle_count);
     auto* triangles = const_cast<CrtTriangle*>(arrayOf<CrtTriangle>(c, header.triangles));

@@ -583,10 +583,10 @@ TEST_CASE("shapes are part of a scene's identity, and of what it needs", "[shape
     Scene scene = emptyScene();
     add(scene, sphere(1));
     const CompiledScene one = compiled(scene);
-    CHECK((one.features & CRT_FEATURE_SHAPES) != 0);
+    CHECK((one.header().features & CRT_FEATURE_SHAPES) != 0);
     CHECK(one.triangles == 0);
     CHECK(one.shapes == 1);
-    CHECK((compiled(litFloor()).features & CRT_FEATURE_SHAPES) == 0);
+    CHECK((compiled(litFloor()).header().features & CRT_FEATURE_SHAPES) == 0);
     scene.objects[0].shape = cap(1, -1, 0.5);
     CHECK(compiled(scene).hash != one.hash);
     scene.objects[0].shape = sphere(1);

@@ -79,7 +79,7 @@ public:
     explicit Probe(const std::string& yaml, const std::string& folder = {})
         : scene_(sceneOf(yaml, folder)), compiled_(crt::compileScene(scene_, 0)) {
         context_.blob = compiled_.data();
-        context_.scene = reinterpret_cast<const CrtScene*>(compiled_.data());
+        context_.scene = &compiled_.header();
     }
     const CompiledScene& compiled() const { return compiled_; }
     const Scene& scene() const { return scene_; }
@@ -229,7 +229,7 @@ TEST_CASE("images: bilinear between texels, wrapped, as in double arithmetic", "
                 CHECK(distance(seen.texels[y * 5 + x], picture.at(x, y)) < kColorError);
             }
         INFO(wrap);
-        CHECK((probe.compiled().features & CRT_FEATURE_TEXTURE) != 0);
+        CHECK((probe.compiled().header().features & CRT_FEATURE_TEXTURE) != 0);
         double worst = 0;
         for (int i = 0; i < 150; ++i) {
             const double u = static_cast<f32>(random.uniform(-3, 4)),
@@ -318,7 +318,7 @@ TEST_CASE("checkers alternate, also below zero, and may be made of textures", "[
     CHECK(value(0.51 + 0.125, 0.01) == 0.75f);
     CHECK(value(-0.01, 0.01) == 0.75f);
     CHECK(value(1e5 + 0.1, 0.1) == 0.25f);
-    CHECK((probe.compiled().features & CRT_FEATURE_TABLE) == 0);
+    CHECK((probe.compiled().header().features & CRT_FEATURE_TABLE) == 0);
     // Spectra of its values are in the scene's table.
     const Probe colored(squareWith("{checker: [{rgb: [0.7, 0.2, 0.1], space: linear}, 0.5]}"));
     CHECK(distance(colored.color(0.5, 0.5), {0.7, 0.2, 0.1}) < 1e-3);
@@ -386,7 +386,7 @@ TEST_CASE("roughness from a channel of an image", "[texture]") {
     const auto roughness = [](const Probe& p, double u) {
         CrtContext context{};
         context.blob = p.compiled().data();
-        context.scene = reinterpret_cast<const CrtScene*>(p.compiled().data());
+        context.scene = &p.compiled().header();
         const CrtSurface surface = Probe::at(u, 0.5);
         const CrtMaterial* m = CRT_ARRAY(CrtMaterial, context.blob, context.scene->materials);
         return V4X(crt_value(&context, m[0].roughness, &surface, splat4(7)));
@@ -416,17 +416,17 @@ TEST_CASE("a file is in memory once, and scenes without textures have nothing of
     CHECK(compiled.texel_bytes == 16 * 16 * 6);
 
     const CompiledScene plain = crt::compileScene(sceneOf(squareWith("0.5")), 0);
-    const CrtScene& header = *reinterpret_cast<const CrtScene*>(plain.data());
+    const CrtScene& header = plain.header();
     CHECK(header.uvs.count == 0);
     CHECK(header.textures.count == 0);
     CHECK(header.vertex_colors.count == 0);
-    CHECK((plain.features & CRT_FEATURE_TEXTURE) == 0);
+    CHECK((plain.header().features & CRT_FEATURE_TEXTURE) == 0);
     // A texture of a material that nothing has is not decoded.
     const CompiledScene unused = crt::compileScene(
         sceneOf("crt: 1\nmaterials: {a: {type: diffuse, reflectance: {texture: a.png}}}\n", folder.path()),
         0);
     CHECK(unused.texel_bytes == 0);
-    CHECK((unused.features & CRT_FEATURE_TEXTURE) == 0);
+    CHECK((unused.header().features & CRT_FEATURE_TEXTURE) == 0);
 }
 
 TEST_CASE("films of scenes whose textures differ do not merge", "[texture]") {

@@ -170,8 +170,8 @@ TEST_CASE("a changed view is the scene compiled with that camera and film", "[vi
         REQUIRE(crt::changeView(moved, scene, {}));
         const CompiledScene anew = compiled(scene, crt::kAovDepth | crt::kAovPrimitive);
         CHECK(sameBytes(moved, anew));
-        CHECK(moved.width == 50);
-        CHECK(moved.height == 40);
+        CHECK(moved.header().width == 50);
+        CHECK(moved.header().height == 40);
         CHECK(moved.hash.empty());
     }
 }

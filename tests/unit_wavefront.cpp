@@ -63,14 +63,15 @@ TEST_CASE("each kind of material has a shader that holds no other kind", "[wavef
         sceneOf({crt::MaterialType::Diffuse, crt::MaterialType::Mirror, crt::MaterialType::Diffuse}));
     const WavePlan plan = planWave(c.data());
     REQUIRE(plan.kernels.size() == 3);
-    CHECK(plan.kernels[0] == KernelSpec{Entry::Trace, c.features});
+    CHECK(plan.kernels[0] == KernelSpec{Entry::Trace, c.header().features});
     REQUIRE(plan.queues() == 2);
     for (const std::uint32_t kind : {CRT_MATERIAL_DIFFUSE, CRT_MATERIAL_MIRROR}) {
         const std::uint64_t bit = std::uint64_t{1} << kind;
         const std::uint32_t queue = plan.queue_of_kind[kind];
         REQUIRE(queue < plan.queues());
         CHECK(plan.kernels[queue + 1] ==
-              KernelSpec{Entry::Shade, (c.features & ~std::uint64_t{CRT_FEATURES_MATERIALS}) | bit});
+              KernelSpec{Entry::Shade,
+                         (c.header().features & ~std::uint64_t{CRT_FEATURES_MATERIALS}) | bit});
     }
     CHECK(plan.queue_of_kind[CRT_MATERIAL_DIFFUSE] != plan.queue_of_kind[CRT_MATERIAL_MIRROR]);
     // There is no mix, and nothing shines from outside.
@@ -85,7 +86,7 @@ TEST_CASE("a material that nothing is made of has no shader", "[wavefront]") {
     const CompiledScene c = compiled(scene);
     const WavePlan plan = planWave(c.data());
     CHECK(plan.queues() == 2);
-    for (const KernelSpec& kernel : plan.kernels) CHECK((kernel.features & ~c.features) == 0);
+    for (const KernelSpec& kernel : plan.kernels) CHECK((kernel.features & ~c.header().features) == 0);
 }
 
 TEST_CASE("a shader holds the film that its kind has, and not that of another", "[wavefront]") {
@@ -96,7 +97,7 @@ TEST_CASE("a shader holds the film that its kind has, and not that of another", 
     scene.materials[2].eta = crt::constantSpectrum(1.5);
     scene.materials[1].film_thickness_nm = 300;
     const CompiledScene c = compiled(scene);
-    REQUIRE((c.features & CRT_FEATURE_THIN_FILM) != 0);
+    REQUIRE((c.header().features & CRT_FEATURE_THIN_FILM) != 0);
     const WavePlan plan = planWave(c.data());
     const auto featuresOf = [&](std::uint32_t kind) {
         return plan.kernels[plan.queue_of_kind[kind] + 1].features;
@@ -111,7 +112,7 @@ TEST_CASE("a mix goes to the queues of what it is made of", "[wavefront]") {
         sceneOf({crt::MaterialType::Diffuse, crt::MaterialType::Mirror, crt::MaterialType::Mix});
     scene.materials[2].parts = {0, 1};
     const CompiledScene c = compiled(scene);
-    REQUIRE((c.features & CRT_FEATURE_MIX) != 0);
+    REQUIRE((c.header().features & CRT_FEATURE_MIX) != 0);
     const WavePlan plan = planWave(c.data());
     REQUIRE(plan.queues() == 3);
     CHECK(plan.queue_of_choice == 2);
@@ -140,7 +141,7 @@ TEST_CASE("what meets nothing is shaded where something shines there, without an
     scene.environment.emplace();
     scene.environment->radiance = crt::constantSpectrum(1);
     const CompiledScene c = compiled(scene);
-    REQUIRE((c.features & CRT_FEATURE_ENVIRONMENT) != 0);
+    REQUIRE((c.header().features & CRT_FEATURE_ENVIRONMENT) != 0);
     const WavePlan plan = planWave(c.data());
     REQUIRE(plan.queue_of_miss < plan.queues());
     CHECK((plan.kernels[plan.queue_of_miss + 1].features & CRT_FEATURES_MATERIALS) == 0);

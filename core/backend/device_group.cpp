@@ -42,6 +42,10 @@ std::string listOf(const std::vector<CrtDevice>& devices) {
     return text;
 }
 
+std::uint64_t pixelsOf(const CompiledScene& scene) {
+    return std::uint64_t{scene.header().width} * scene.header().height;
+}
+
 std::uint64_t samplesOf(const std::vector<RenderRange>& ranges) {
     std::uint64_t samples = 0;
     for (const RenderRange& range : ranges) samples += range.sample_count;
@@ -235,7 +239,7 @@ void DeviceGroup::loadScene(const CompiledScene& scene, const std::function<void
         member.integrator->setScene(scene, [&](double done) { shown.part(member.index, done * part); });
         member.has_scene = true;
     });
-    window_pixels_ = std::uint64_t{scene.width} * scene.height;
+    window_pixels_ = pixelsOf(scene);
 }
 
 void DeviceGroup::readmitThoseWithoutRoom() {
@@ -245,7 +249,7 @@ void DeviceGroup::readmitThoseWithoutRoom() {
 
 void DeviceGroup::setScene(const CompiledScene& scene, const std::function<void(double)>& progress) {
     readmitThoseWithoutRoom();
-    film_pixels_ = std::uint64_t{scene.width} * scene.height;
+    film_pixels_ = pixelsOf(scene);
     for (const auto& member : members_) {
         member->share.samples = 0;
         member->share.seconds = 0;

@@ -290,7 +290,8 @@ CompileOptions compileOptionsFor(const LoadedBackend& backend) {
 
 void Integrator::setScene(const CompiledScene& scene, const std::function<void(double)>& progress) {
     Impl& self = *impl_;
-    const std::uint64_t lacking = scene.features & ~self.backend.table->features;
+    const kernel::CrtScene& header = scene.header();
+    const std::uint64_t lacking = header.features & ~self.backend.table->features;
     if (lacking != 0) {
         throw Error(ErrorKind::Backend, fmt::format("backend '{}' cannot render this scene: it lacks {}",
                                                     self.backend.name, featureNames(lacking)));
@@ -314,10 +315,10 @@ void Integrator::setScene(const CompiledScene& scene, const std::function<void(d
         show, "set_scene", [&] { return self.table.set_scene(self.table.state, &blob); });
     if (self.progress_error) std::rethrow_exception(std::exchange(self.progress_error, nullptr));
     self.check(status);
-    self.width = scene.width;
-    self.height = scene.height;
-    self.channels = scene.channels;
-    self.has_primitives = (scene.aovs & kAovPrimitive) != 0;
+    self.width = header.width;
+    self.height = header.height;
+    self.channels = header.channels;
+    self.has_primitives = (header.aovs & kAovPrimitive) != 0;
     self.samples = {};
     self.film_is_whole = true;
     self.has_scene = true;

@@ -89,7 +89,7 @@ std::string materialsText(const Scene& scene) {
 }
 
 std::string texturesText(const CompiledScene& compiled) {
-    if ((compiled.features & CRT_FEATURE_TEXTURE) == 0) return "none";
+    if ((compiled.header().features & CRT_FEATURE_TEXTURE) == 0) return "none";
     if (compiled.images == 0) return "no images";
     return fmt::format("{}, {} of texels", counted(compiled.images, "image", "images"),
                        bytesText(static_cast<double>(compiled.texel_bytes)));
@@ -116,16 +116,16 @@ std::string lightsText(const Scene& scene, const CompiledScene& compiled) {
 }
 
 std::string acceleratorText(const CompiledScene& compiled) {
-    if (compiled.features & CRT_FEATURE_BVH)
+    if (compiled.header().features & CRT_FEATURE_BVH)
         return fmt::format("BVH, {}", counted(compiled.nodes, "node of four", "nodes of four"));
-    if (compiled.features & CRT_FEATURE_AABB)
+    if (compiled.header().features & CRT_FEATURE_AABB)
         return fmt::format("a box around each of {}", counted(compiled.objects, "object", "objects"));
     if (compiled.shapes > 0) return "a loop over all triangles and shapes";
     return compiled.triangles == 0 ? "none: there is nothing to hit" : "a loop over all triangles";
 }
 
 std::string scheduleText(const Scene& scene, const CompiledScene& compiled) {
-    return wantsWavefront(compiled.features, static_cast<std::uint32_t>(scene.integrator.max_depth))
+    return wantsWavefront(compiled.header().features, static_cast<std::uint32_t>(scene.integrator.max_depth))
                ? "cuda traces and shades by kernels of their own, paths sorted by material (--kernel lean)"
                : "one kernel takes a path to its end";
 }
@@ -154,7 +154,7 @@ void showScene(const SceneRequest& what, bool verbose) {
                                     scene.sampler.seed, scene.sampler.samples));
     printRow("accelerator", acceleratorText(compiled));
     printRow("schedule", scheduleText(scene, compiled));
-    printRow("needs", featureNames(compiled.features));
+    printRow("needs", featureNames(compiled.header().features));
     std::string left_out;
     for (const auto& [thing, why] : compiled.left_out)
         left_out += fmt::format("{}{}: {}", left_out.empty() ? "" : "\n", thing, why);

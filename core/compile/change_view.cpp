@@ -9,20 +9,17 @@
 namespace crt {
 
 bool changeView(CompiledScene& compiled, const Scene& scene, const CompileOptions& options) {
-    const bool has_lens = (compiled.features & CRT_FEATURE_LENS) != 0;
+    const bool has_lens = (compiled.header().features & CRT_FEATURE_LENS) != 0;
     if (has_lens != (scene.camera.aperture_radius > 0)) return false;
     if (compiled.without_nodes &&
         !backendFindsHits(scene.camera, compiled.centre, compiled.scale_exponent, options))
         return false;
     // Farther away the digits would be in the wrong place (focus.h).
     if (length(scene.camera.position - compiled.centre) > compiled.camera_reach) return false;
-    auto& header = *reinterpret_cast<kernel::CrtScene*>(compiled.blob.data());
-    kernel::CrtScene changed = header;
+    kernel::CrtScene changed = compiled.header();
     compileView(scene, compiled.centre, compiled.scale_exponent, changed);
-    header = changed;
-    findCameraMedia(reinterpret_cast<unsigned char*>(compiled.blob.data()));
-    compiled.width = header.width;
-    compiled.height = header.height;
+    compiled.header() = changed;
+    findCameraMedia(compiled.data());
     compiled.hash.clear();
     return true;
 }

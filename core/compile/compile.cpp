@@ -216,14 +216,9 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
 
     CompiledScene out;
     out.blob = blob.finish(header);
-    findCameraMedia(reinterpret_cast<unsigned char*>(out.blob.data()));
-    markTouchingMedia(reinterpret_cast<unsigned char*>(out.blob.data()));
+    findCameraMedia(out.data());
+    markTouchingMedia(out.data());
     out.size_bytes = out.blob.size() * sizeof(CompiledScene::Line);
-    out.features = header.features;
-    out.width = header.width;
-    out.height = header.height;
-    out.channels = header.channels;
-    out.aovs = header.aovs;
     out.spectral_channels = spectralChannelsOf(scene).count();
     out.triangles = flat.firstShape();
     out.shapes = flat.shapes.size();
@@ -243,17 +238,15 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
     out.left_out = leftOut(scene, header, occluders, accelerator.without_nodes);
     out.hash = sceneIdentity(out.data(), flat.positions);
     out.build_seconds = accelerator.build_seconds;
-    out.compile_seconds =
-        compiling.seconds() - out.build_seconds;
+    out.compile_seconds = compiling.seconds() - out.build_seconds;
     return out;
 }
 
 /// "'ceiling light'": what the author calls the object of a primitive.
 std::string objectOf(const Scene& scene, const CompiledScene& compiled, std::uint32_t primitive) {
     using namespace kernel;
-    const auto* header = reinterpret_cast<const CrtScene*>(compiled.data());
     std::uint32_t placement =
-        CRT_ARRAY(CrtPrimitive, compiled.data(), header->primitives)[primitive].object &
+        CRT_ARRAY(CrtPrimitive, compiled.data(), compiled.header().primitives)[primitive].object &
         ~CRT_PRIMITIVE_TOUCHES;
     for (const Object& object : scene.objects) {
         if (placement < object.transforms.size())

@@ -2,6 +2,7 @@
 /// what it needs.
 #pragma once
 
+#include "kernel/layout.h"
 #include "scene/scene.h"
 
 #include <cstddef>
@@ -17,11 +18,7 @@ struct CompiledScene {
     };
     std::vector<Line> blob;           ///< Read it through data(): 64-byte aligned.
     std::size_t size_bytes = 0;
-    std::uint64_t features = 0;       ///< kernel/features.h
-    std::uint32_t width = 0, height = 0;  ///< Of the crop window.
-    std::uint32_t channels = 0;       ///< Film channels.
-    std::uint32_t aovs = 0;
-    std::uint32_t spectral_channels = 0;  ///< Of these channels, behind all others.
+    std::uint32_t spectral_channels = 0;  ///< Of the film's channels, behind all others.
     std::uint64_t triangles = 0, shapes = 0, instances = 0, emitters = 0, objects = 0, nodes = 0;
     std::uint64_t instanced_triangles = 0;  ///< Of the meshes that instances show, each counted once.
     std::uint64_t images = 0, texel_bytes = 0;  ///< Of textures.
@@ -35,7 +32,10 @@ struct CompiledScene {
     double compile_seconds = 0;
     std::vector<std::pair<std::string, std::string>> left_out;  ///< What this scene does not need, and why.
 
+    unsigned char* data() { return reinterpret_cast<unsigned char*>(blob.data()); }
     const unsigned char* data() const { return reinterpret_cast<const unsigned char*>(blob.data()); }
+    kernel::CrtScene& header() { return *reinterpret_cast<kernel::CrtScene*>(data()); }
+    const kernel::CrtScene& header() const { return *reinterpret_cast<const kernel::CrtScene*>(data()); }
 };
 
 /// What the backend that will read the blob brings itself (crt_backend.h): nothing is built that it would

@@ -148,7 +148,7 @@ std::vector<std::uint32_t> slotsNearAsked(const CompiledScene& scene, const kern
 }  // namespace
 
 CompiledScene nearScene(const CompiledScene& scene) {
-    kernel::CrtScene header = *reinterpret_cast<const kernel::CrtScene*>(scene.data());
+    kernel::CrtScene header = scene.header();
     const auto* triangles = CRT_ARRAY(CrtTriangle, scene.data(), header.triangles);
     const auto* faces = CRT_ARRAY(CrtFace, scene.data(), header.faces);
     const auto* primitives = CRT_ARRAY(CrtPrimitive, scene.data(), header.primitives);
@@ -182,7 +182,6 @@ CompiledScene nearScene(const CompiledScene& scene) {
     CompiledScene reduced;
     reduced.blob = blob.finish(header);
     reduced.size_bytes = reduced.blob.size() * sizeof(CompiledScene::Line);
-    reduced.features = scene.features;
     reduced.triangles = scene.triangles;
     reduced.shapes = scene.shapes;
     reduced.instances = scene.instances;

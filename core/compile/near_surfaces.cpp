@@ -20,7 +20,7 @@ namespace {
 kernel::CrtContext contextOf(const CompiledScene& scene) {
     kernel::CrtContext context{};
     context.blob = scene.data();
-    context.scene = reinterpret_cast<const kernel::CrtScene*>(scene.data());
+    context.scene = &scene.header();
     return context;
 }
 

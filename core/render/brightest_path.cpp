@@ -40,7 +40,7 @@ class SurfacePoints {
 public:
     explicit SurfacePoints(const CompiledScene& scene) {
         context_.blob = scene.data();
-        context_.scene = reinterpret_cast<const CrtScene*>(scene.data());
+        context_.scene = &scene.header();
         triangles_ = CRT_ARRAY(CrtTriangle, context_.blob, context_.scene->triangles);
     }
 
@@ -246,7 +246,7 @@ std::optional<double> SurfacePoints::brightest(std::vector<LitPath> paths, std::
 }  // namespace
 
 BrightestPath brightestPathOf(const CompiledScene& scene) {
-    const auto& header = *reinterpret_cast<const CrtScene*>(scene.data());
+    const CrtScene& header = scene.header();
     if (header.view != CRT_VIEW_PATH || header.lights.count == 0) return {};
     const SurfacePoints points(scene);
     std::vector<LitPath> mirrored, from_anywhere;

@@ -18,7 +18,7 @@ constexpr std::size_t kRowsAtOnce = 16;
 class Windowed {
 public:
     Windowed(CompiledScene& scene, std::uint32_t first_row, std::uint32_t rows)
-        : scene_(scene), height_(scene.height), crop_y_(header().crop_y) {
+        : header_(scene.header()), height_(header_.height), crop_y_(header_.crop_y) {
         set(crop_y_ + first_row, rows);
     }
     ~Windowed() { set(crop_y_, height_); }
@@ -26,14 +26,13 @@ public:
     Windowed& operator=(const Windowed&) = delete;
 
 private:
-    kernel::CrtScene& header() { return *reinterpret_cast<kernel::CrtScene*>(scene_.blob.data()); }
     void set(std::uint32_t crop_y, std::uint32_t height) {
-        header().crop_y = crop_y;
-        header().height = scene_.height = height;
+        header_.crop_y = crop_y;
+        header_.height = height;
     }
 
-    CompiledScene& scene_;
-    std::uint32_t height_, crop_y_;
+    kernel::CrtScene& header_;
+    const std::uint32_t height_, crop_y_;
 };
 
 /// to[first_row, …) = part.
@@ -66,7 +65,7 @@ void DeviceFilm::setScene(const std::function<void(double)>& progress) {
     try {
         devices_.setScene(scene_, progress);
     } catch (const Error& error) {
-        if (!error.lacksMemory() || scene_.height == 1) throw;
+        if (!error.lacksMemory() || scene_.header().height == 1) throw;
         beginBands(error);
     }
 }
@@ -74,7 +73,7 @@ void DeviceFilm::setScene(const std::function<void(double)>& progress) {
 /// Devices do not say how much of a film they could hold: other programs share their memory, and drivers
 /// take some of it when they see fit. So it is tried.
 void DeviceFilm::beginBands(const Error& why) {
-    std::uint32_t rows = scene_.height;
+    std::uint32_t rows = scene_.header().height;
     for (bool fits = false; !fits;) {
         rows = (rows + 1) / 2;
         try {
@@ -91,12 +90,12 @@ void DeviceFilm::beginBands(const Error& why) {
 
 /// Into bands of about the same size, of at most `rows`, from `first` on.
 void DeviceFilm::cut(std::uint32_t first, std::uint32_t rows) {
-    const std::uint32_t all = scene_.height - first;
+    const std::uint32_t all = scene_.header().height - first;
     const std::uint32_t count = (all + rows - 1) / rows;
     const std::uint32_t even = (all + count - 1) / count;
     std::erase_if(bands_, [first](const Band& band) { return band.first >= first; });
-    for (; first < scene_.height; first += even)
-        bands_.push_back({first, std::min(first + even, scene_.height)});
+    for (; first < scene_.header().height; first += even)
+        bands_.push_back({first, std::min(first + even, scene_.header().height)});
 }
 
 void DeviceFilm::render(const RenderRange& range, const std::function<void(double)>& progress) {
@@ -108,7 +107,7 @@ void DeviceFilm::render(const RenderRange& range, const std::function<void(doubl
         } catch (const Error& error) {
             // A film may just have fitted, with too little left to work in. Later than the first time there
             // is something on the devices that would be lost.
-            if (!error.lacksMemory() || rendered_ || scene_.height == 1) throw;
+            if (!error.lacksMemory() || rendered_ || scene_.header().height == 1) throw;
             beginBands(error);
         }
     }
@@ -176,8 +175,8 @@ void DeviceFilm::readFilm(Film& film) {
 }
 
 FilmShape filmShapeOf(const CompiledScene& compiled) {
-    return {compiled.width, compiled.height, compiled.channels, compiled.aovs,
-            compiled.spectral_channels};
+    const kernel::CrtScene& header = compiled.header();
+    return {header.width, header.height, header.channels, header.aovs, compiled.spectral_channels};
 }
 
 }  // namespace crt

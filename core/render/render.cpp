@@ -162,7 +162,7 @@ void SceneOnDevices::compile() {
     brightest_path_ = brightestPathOf(*compiled_);
     logDebug("the brightest paths have a luminance of {:.3g}{} ({:.3f} s)", brightest_path_.luminance,
              brightest_path_.rare ? ", and are rare" : "", looking.seconds());
-    logDebug("scene {} needs {}", compiled_->hash, featureNames(compiled_->features));
+    logDebug("scene {} needs {}", compiled_->hash, featureNames(compiled_->header().features));
     warnOfIdleLamps(scene_);
     warnOfMissingLight(scene_);
 }

@@ -137,8 +137,8 @@ std::string reportJson(const Scene& scene, const CompiledScene& compiled, const 
                        {"title", scene.title},
                        {"hash", compiled.hash},
                        {"files_read", std::move(files)},
-                       {"width", compiled.width},
-                       {"height", compiled.height},
+                       {"width", compiled.header().width},
+                       {"height", compiled.header().height},
                        {"objects", compiled.objects},
                        {"triangles", compiled.triangles},
                        {"shapes", compiled.shapes},
@@ -151,8 +151,8 @@ std::string reportJson(const Scene& scene, const CompiledScene& compiled, const 
 
     Json left_out = Json::array();
     for (const auto& [what, why] : compiled.left_out) left_out.push_back({{"what", what}, {"why", why}});
-    report["features"] = {{"mask", fmt::format("{:#x}", compiled.features)},
-                          {"kept", featureList(compiled.features)},
+    report["features"] = {{"mask", fmt::format("{:#x}", compiled.header().features)},
+                          {"kept", featureList(compiled.header().features)},
                           {"left_out", std::move(left_out)}};
 
     // parse, build, compile, open, prepare, sampling, write and other make up the total. The others are

@@ -10,7 +10,7 @@ namespace crt {
 
 PrimitiveNames::PrimitiveNames(const CompiledScene& compiled, const Scene& scene) {
     using namespace kernel;
-    const auto& header = *reinterpret_cast<const CrtScene*>(compiled.data());
+    const CrtScene& header = compiled.header();
     const CrtPrimitive* const primitives = CRT_ARRAY(CrtPrimitive, compiled.data(), header.primitives);
     primitives_.reserve(header.primitives.count);
     for (std::uint32_t i = 0; i < header.primitives.count; ++i)

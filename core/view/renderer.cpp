@@ -215,7 +215,7 @@ void Renderer::renderChunk(const RenderWishes& wanted, std::uint64_t count) {
     const double seconds = rendering.seconds();
     samples_ += count;
     seconds_ += seconds;
-    pace_.rendered(std::uint64_t{compiled_->width} * compiled_->height, count, seconds);
+    pace_.rendered(std::uint64_t{compiled_->header().width} * compiled_->header().height, count, seconds);
     const Stopwatch handing;
     handOn(wanted);
     if (divisor_ == 1) pace_.handedOn(handing.seconds());

@@ -171,8 +171,8 @@ BackendComparison compareBackends(const Scene& scene, const BackendComparisonOpt
     const CompiledScene compiled = compileScene(scene, 0);
     result.reference = options.backends.back();
     result.scene_file = scene.file;
-    result.width = compiled.width;
-    result.height = compiled.height;
+    result.width = compiled.header().width;
+    result.height = compiled.header().height;
     result.seed = scene.sampler.seed;
     result.replicates = options.replicates;
     result.gate = options.gate;

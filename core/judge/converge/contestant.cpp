@@ -85,16 +85,16 @@ void Contestant::describe(const CompiledScene& compiled) {
     if (report.kernel_from_cache != 0) c.kernel += ", from the cache";
     c.scene_file = scene_.file;
     c.scene_hash = compiled.hash;
-    c.width = compiled.width;
-    c.height = compiled.height;
-    for (const std::string& feature : featureList(compiled.features))
+    c.width = compiled.header().width;
+    c.height = compiled.header().height;
+    for (const std::string& feature : featureList(compiled.header().features))
         c.kept.push_back({feature, "the scene needs it"});
     for (const auto& [what, why] : compiled.left_out) c.left_out.push_back({what, why});
     c.stages.parse = scene_.parse_seconds;
     c.stages.build = compiled.compile_seconds + compiled.build_seconds + report.build_seconds;
     c.stages.compile = report.compile_seconds + report.cache_seconds;
     c.stages.upload = report.upload_seconds;
-    tests_ = stats::Replicates(compiled.width, compiled.height, 3);
+    tests_ = stats::Replicates(compiled.header().width, compiled.header().height, 3);
 }
 
 /// What a film amounts to after so many samples.

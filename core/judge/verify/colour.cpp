@@ -280,7 +280,8 @@ void needlessDispersion(Context& context) {
                          "wavelengths are given up where nothing disperses");
         context.holds(
             fmt::format("{}: the kernel is left without dispersion", what),
-            (compileScene(context.scene(cubeInLight(ior)), 0).features & CRT_FEATURE_DISPERSION) == 0,
+            (compileScene(context.scene(cubeInLight(ior)), 0).header().features & CRT_FEATURE_DISPERSION) ==
+                0,
             "left out", "a constant index is taken for a dispersive one");
     }
 }

@@ -48,7 +48,7 @@ std::vector<Variant> variants(int resolution) {
     const auto add = [&](const char* name, auto change) {
         Scene scene = richRoom(resolution);
         change(scene);
-        const std::uint64_t needs = compileScene(scene, kAllAovs).features;
+        const std::uint64_t needs = compileScene(scene, kAllAovs).header().features;
         all.push_back({name, std::move(scene), needs});
     };
     add("Sobol", [](Scene& s) { s.sampler.type = SamplerType::Sobol; });
@@ -272,8 +272,8 @@ Film portableFilm(const Scene& scene, const Render& how) {
     kernel::CrtContext context{};
     context.blob = compiled.data();
     context.scene = reinterpret_cast<const kernel::CrtScene*>(compiled.data());
-    for (std::uint32_t y = 0; y < compiled.height; ++y)
-        for (std::uint32_t x = 0; x < compiled.width; ++x) {
+    for (std::uint32_t y = 0; y < compiled.header().height; ++y)
+        for (std::uint32_t x = 0; x < compiled.header().width; ++x) {
             kernel::CrtRayCount rays{};
             kernel::crt_render_pixel(&context, x, y, how.first_sample,
                                      static_cast<std::uint32_t>(how.samples), film.sums.data(),
