@@ -77,18 +77,6 @@ std::size_t expectedBytes(const FlatScene& flat, const AcceleratorPart& accelera
            recordsOf(flat, &FlatScene::colors) * sizeof(kernel::CrtVertexColors);
 }
 
-std::vector<const Spectrum*> spectraOf(const Scene& scene, const FlatScene& flat,
-                                       const std::vector<std::uint32_t>& emitting,
-                                       const std::vector<const Material*>& materials,
-                                       const MaterialTables& tables,
-                                       const std::vector<TextureIndex>& textures) {
-    std::vector<const Spectrum*> all = spectraOfLights(scene, flat, emitting);
-    for (const Spectrum* spectrum : spectraOfTextures(scene, textures)) all.push_back(spectrum);
-    for (const Spectrum* spectrum : spectraOfMaterials(materials, tables)) all.push_back(spectrum);
-    if (const Spectrum* environment = spectrumOfEnvironment(scene)) all.push_back(environment);
-    return all;
-}
-
 /// Warns of lights that nothing in the scene can show.
 void warnOfUnseenLights(const Scene& scene, const kernel::CrtScene& header) {
     if (header.point_lights.count == 0 || (header.features & CRT_FEATURE_POINT_LIGHT) != 0) return;
@@ -141,7 +129,7 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
 
     const std::vector<std::uint32_t> emitting = emittingTriangles(scene, flat);
     const MaterialTables tables = materialTablesOf(used);
-    const SpectrumTable spectra(spectraOf(scene, flat, emitting, used, tables, textures));
+    SpectrumTable spectra;
 
     std::optional<EnvironmentTexels> around;
     if (spectrumOfEnvironment(scene) && scene.environment->dependsOnDirection()) {
@@ -159,12 +147,15 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
         logWarning(
             "the scene has no light: the image will be black "
             "(add emission to an object, lights, or an environment)");
-    const Spectrum* environment = spectrumOfEnvironment(scene);
-    header.environment = environment ? spectra.valueOf(*environment) : CRT_NONE;
 
     TexturePart texture_part = compileTextures(scene, textures, spectra, blob);
     header.textures = blob.append(texture_part.records);
     const MaterialPart materials = compileMaterials(used, tables, spectra, texture_part);
+    // Behind the spectra of all materials.
+    const Spectrum* environment = spectrumOfEnvironment(scene);
+    header.environment = environment ? spectra.valueOf(*environment) : CRT_NONE;
+    if (lights.environment > 0)
+        blob.items<kernel::CrtLight>(header.lights)[lights.environment - 1].radiance = header.environment;
     if (header.textures.count > 0 || (materials.features & CRT_FEATURE_ANISOTROPY) != 0)
         header.uvs = appendOfPrimitives(blob, flat, &FlatScene::uvs);
     if (header.textures.count > 0) header.vertex_colors = appendOfPrimitives(blob, flat, &FlatScene::colors);
@@ -193,7 +184,7 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
     header.media = blob.append(materials.media);
     header.medium_bits = mediumBits(materials.media.size());
     header.compositions = blob.append(compileCompositions(used, texture_part));
-    header.layers = blob.append(compileLayers(used, tables, spectra, texture_part));
+    header.layers = blob.append(materials.layers);
     header.losses = appendLosses(blob, tables.compensations);
 
     header.spectra = blob.append(spectra.floats());

@@ -182,22 +182,9 @@ std::vector<std::uint32_t> emittingTriangles(const Scene& scene, const FlatScene
     return emitting;
 }
 
-std::vector<const Spectrum*> spectraOfLights(const Scene& scene, const FlatScene& flat,
-                                             const std::vector<std::uint32_t>& emitting) {
-    std::vector<const Spectrum*> spectra;
-    std::vector<bool> seen(scene.emissions.size(), false);
-    for (const std::uint32_t id : emitting) {
-        const auto emission = static_cast<std::size_t>(flat.triangles[id].emission);
-        if (!seen[emission]) spectra.push_back(&scene.emissions[emission].radiance);
-        seen[emission] = true;
-    }
-    for (const PointLight* light : shiningPointLights(scene)) spectra.push_back(&light->spectrum);
-    return spectra;
-}
-
 LightPart compileLights(const Scene& scene, const FlatScene& flat,
                         const std::vector<std::uint32_t>& emitting, const AcceleratorPart& accelerator,
-                        const SpectrumTable& spectra, const EnvironmentTexels* around) {
+                        SpectrumTable& spectra, const EnvironmentTexels* around) {
     LightPart part;
     part.light_of.assign(flat.triangles.size(), CRT_NONE);
     struct Shared {
@@ -241,7 +228,6 @@ LightPart compileLights(const Scene& scene, const FlatScene& flat,
     if (samplesEnvironment(scene) && (around == nullptr || around->mean_brightness > 0)) {
         kernel::CrtLight light{};
         light.kind = CRT_LIGHT_ENVIRONMENT;
-        light.radiance = spectra.valueOf(scene.environment->radiance);
         part.lights.push_back(light);
         part.environment = static_cast<std::uint32_t>(part.lights.size());
         power.push_back(areaAround(flat) *

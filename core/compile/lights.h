@@ -19,10 +19,6 @@ namespace crt {
 /// in a view that shows no light.
 std::vector<std::uint32_t> emittingTriangles(const Scene& scene, const FlatScene& flat);
 
-/// The spectra that compileLights asks the table for.
-std::vector<const Spectrum*> spectraOfLights(const Scene& scene, const FlatScene& flat,
-                                             const std::vector<std::uint32_t>& emitting);
-
 struct LightPart {
     std::vector<kernel::CrtLight> lights;
     std::vector<std::uint32_t> light_of;  ///< By primitive id: index of its light, or CRT_NONE.
@@ -32,10 +28,11 @@ struct LightPart {
     std::vector<kernel::CrtPointLight> point_lights;
     std::uint32_t emitters = 0;           ///< Lights that are triangles or parallelograms: the first ones.
 };
-/// `around`: the texels of an environment that has them, or null.
+/// `around`: the texels of an environment that has them, or null. The light of the environment has no
+/// radiance yet: its spectrum comes last in the table.
 LightPart compileLights(const Scene& scene, const FlatScene& flat,
                         const std::vector<std::uint32_t>& emitting, const AcceleratorPart& accelerator,
-                        const SpectrumTable& spectra, const EnvironmentTexels* around);
+                        SpectrumTable& spectra, const EnvironmentTexels* around);
 
 /// The lights, and behind them the tree.
 kernel::CrtSpan appendLights(const LightPart& part, BlobWriter& blob);

@@ -34,49 +34,8 @@ bool isKnown(const FlatTriangle& triangle, std::size_t scene_materials) {
     return triangle.material >= 0 && static_cast<std::size_t>(triangle.material) < scene_materials;
 }
 
-std::vector<const Spectrum*> spectraOfSurface(const Material& material, const MaterialTables& tables) {
-    switch (material.type) {
-        case MaterialType::Diffuse:
-        case MaterialType::Mirror:
-            if (material.reflectance_texture != kNoTexture) return {};
-            return {&material.reflectance};
-        case MaterialType::Conductor: return {&material.eta, &material.k};
-        case MaterialType::RoughConductor:
-            if (material.by_color) {
-                if (material.reflectance_texture != kNoTexture) return {&material.edge_tint};
-                return {&material.reflectance, &material.edge_tint};
-            }
-            if (hasThinFilm(material)) return {&material.eta, &material.k};
-            return {&material.eta, &material.k, &tables.compensations.mean_reflectance.at(&material)};
-        case MaterialType::Dielectric:
-        case MaterialType::RoughDielectric:
-            if (material.absorption) return {&material.eta, &*material.absorption};
-            return {&material.eta};
-        case MaterialType::ThinDielectric: return {&material.eta};
-        case MaterialType::Mix:
-        case MaterialType::TwoSided: return {};
-        case MaterialType::Plastic:
-            if (material.reflectance_texture != kNoTexture)
-                return {&material.eta, &coatOf(tables.coats, material).albedo};
-            return {&material.reflectance, &material.eta, &coatOf(tables.coats, material).albedo};
-    }
-    return {};
-}
-
-std::vector<const Spectrum*> spectraOf(const Material& material, const MaterialTables& tables) {
-    std::vector<const Spectrum*> all = spectraOfSurface(material, tables);
-    if (hasThinFilm(material)) all.push_back(&material.film_index);
-    if (hasFuzz(material)) all.push_back(&material.fuzz_color);
-    if (hasClearcoat(material)) {
-        all.push_back(&material.clearcoat->depth);
-        all.push_back(&coatOf(tables.coats, *material.clearcoat).albedo);
-    }
-    if (hasRoughBase(material)) all.push_back(&tables.rough_bases.at(&material).loss);
-    return all;
-}
-
 kernel::CrtMaterial recordOf(const Material& material, const MaterialTables& tables,
-                             const SpectrumTable& spectra, const TexturePart& textures) {
+                             SpectrumTable& spectra, const TexturePart& textures) {
     const auto reflectance = [&] {
         return material.reflectance_texture != kNoTexture ? textures.valueOf(material.reflectance_texture)
                                                           : spectra.valueOf(material.reflectance);
@@ -90,12 +49,6 @@ kernel::CrtMaterial recordOf(const Material& material, const MaterialTables& tab
     if (material.transmits()) record.flags = CRT_MATERIAL_TRANSMITS;
     const auto losses = tables.compensations.table_of.find(&material);
     if (losses != tables.compensations.table_of.end()) record.loss = losses->second;
-    if (hasThinFilm(material)) {
-        record.film_scale = static_cast<float>(material.film_thickness_nm);
-        record.film_thickness =
-            material.film_texture != kNoTexture ? textures.valueOf(material.film_texture) : valueOf(1);
-        record.film_index = spectra.valueOf(material.film_index);
-    }
     if (const Anisotropy a = anisotropyOf(material); a.narrowing > 0) {
         const double turn = material.anisotropy_rotation_deg * (std::numbers::pi / 180);
         record.widening = static_cast<float>(a.widening);
@@ -115,17 +68,18 @@ kernel::CrtMaterial recordOf(const Material& material, const MaterialTables& tab
                 record.coat = valueOf(material.weight);
                 break;
             }
-            if (!hasThinFilm(material))
-                record.reflectance = spectra.valueOf(tables.compensations.mean_reflectance.at(&material));
             [[fallthrough]];
         case MaterialType::Conductor:
             record.eta = spectra.valueOf(material.eta);
             record.k = spectra.valueOf(material.k);
+            if (material.type == MaterialType::RoughConductor && !hasThinFilm(material))
+                record.reflectance = spectra.valueOf(tables.compensations.mean_reflectance.at(&material));
             break;
         case MaterialType::RoughDielectric: record.roughness = roughness(); [[fallthrough]];
         case MaterialType::Dielectric:
             record.eta = spectra.valueOf(material.eta);
             if (!material.eta.isConstant()) record.flags |= CRT_MATERIAL_DISPERSIVE;
+            if (material.absorption) spectra.valueOf(*material.absorption);  // for numberMedia()
             break;
         case MaterialType::ThinDielectric: record.eta = spectra.valueOf(material.eta); break;
         case MaterialType::Mix:
@@ -140,6 +94,43 @@ kernel::CrtMaterial recordOf(const Material& material, const MaterialTables& tab
             if (material.by_color) record.flags |= CRT_MATERIAL_OPENPBR;
             break;
         }
+    }
+    if (hasThinFilm(material)) {
+        record.film_scale = static_cast<float>(material.film_thickness_nm);
+        record.film_thickness =
+            material.film_texture != kNoTexture ? textures.valueOf(material.film_texture) : valueOf(1);
+        record.film_index = spectra.valueOf(material.film_index);
+    }
+    return record;
+}
+
+kernel::CrtLayers layersOf(const Material& material, const MaterialTables& tables, SpectrumTable& spectra,
+                           const TexturePart& textures) {
+    kernel::CrtLayers record{};
+    if (hasFuzz(material)) {
+        record.fuzz_weight = static_cast<float>(material.fuzz);
+        record.fuzz_roughness = static_cast<float>(material.fuzz_roughness);
+        record.fuzz_color = spectra.valueOf(material.fuzz_color);
+    }
+    if (hasClearcoat(material)) {
+        const Clearcoat& coat = *material.clearcoat;
+        const Coat& table = coatOf(tables.coats, coat);
+        record.clear_ior = static_cast<float>(coat.ior);
+        record.clear_roughness = static_cast<float>(coat.roughness);
+        record.clear_depth = spectra.valueOf(coat.depth);
+        record.clear_albedo = spectra.valueOf(table.albedo);
+        record.clear_internal = static_cast<float>(table.internal_reflectance);
+        record.clear_darkening = static_cast<float>(coat.darkening);
+        record.clear_base = material.roughness_texture != kNoTexture
+                                ? textures.valueOf(material.roughness_texture)
+                                : valueOf(coat.base_roughness);
+    }
+    if (hasRoughBase(material)) {
+        const RoughBase& base = tables.rough_bases.at(&material);
+        record.base_loss = spectra.valueOf(base.loss);
+        record.base_roughness = static_cast<float>(material.diffuse_roughness);
+        record.base_scale = static_cast<float>(1 / base.most);
+        record.base_mean = static_cast<float>(base.mean);
     }
     return record;
 }
@@ -185,15 +176,6 @@ MaterialTables materialTablesOf(const std::vector<const Material*>& materials) {
     return {std::move(coats), compensationsOf(materials), std::move(rough_bases)};
 }
 
-std::vector<const Spectrum*> spectraOfMaterials(const std::vector<const Material*>& materials,
-                                                const MaterialTables& tables) {
-    std::vector<const Spectrum*> all;
-    for (const Material* material : materials)
-        if (material)
-            for (const Spectrum* spectrum : spectraOf(*material, tables)) all.push_back(spectrum);
-    return all;
-}
-
 namespace {
 
 /// The glass behind the surface of a material or of a mix; null if there is none.
@@ -211,7 +193,7 @@ const Material* glassOf(const Material& material, const std::vector<const Materi
 /// Numbers the media that the surfaces of the materials bound. Without absorption and holes there are no
 /// numbers, because no ray needs them. Media that absorb equally share a number. Each medium with holes has
 /// its own, so that a ray can tell whether it entered through a hole.
-void numberMedia(const std::vector<const Material*>& materials, const SpectrumTable& spectra,
+void numberMedia(const std::vector<const Material*>& materials, SpectrumTable& spectra,
                  MaterialPart& part) {
     std::map<std::pair<kernel::CrtValue, std::size_t>, std::uint32_t> numbers;
     bool matter = false;
@@ -246,13 +228,16 @@ std::uint32_t mediumBits(std::size_t media) {
 }
 
 MaterialPart compileMaterials(const std::vector<const Material*>& materials, const MaterialTables& tables,
-                              const SpectrumTable& spectra, const TexturePart& textures) {
+                              SpectrumTable& spectra, const TexturePart& textures) {
     MaterialPart part;
+    bool has_layers = false;
     for (const Material* material : materials) {
-        part.records.push_back(material ? recordOf(*material, tables, spectra, textures)
-                                        : kernel::CrtMaterial{});
+        kernel::CrtMaterial& record = part.records.emplace_back();
+        kernel::CrtLayers& layers = part.layers.emplace_back();
         if (!material) continue;
-        const kernel::CrtMaterial& record = part.records.back();
+        record = recordOf(*material, tables, spectra, textures);
+        layers = layersOf(*material, tables, spectra, textures);
+        has_layers |= hasFuzz(*material) || hasClearcoat(*material) || hasRoughBase(*material);
         if (!material->isOpaque()) part.features |= CRT_FEATURE_OPACITY;
         if (material->normal_texture != kNoTexture) part.features |= CRT_FEATURE_NORMAL_MAP;
         if (material->isComposed()) {
@@ -267,6 +252,7 @@ MaterialPart compileMaterials(const std::vector<const Material*>& materials, con
         if (hasClearcoat(*material)) part.features |= CRT_FEATURE_CLEARCOAT;
         if (hasRoughBase(*material)) part.features |= CRT_FEATURE_ROUGH_BASE;
     }
+    if (!has_layers) part.layers.clear();
     numberMedia(materials, spectra, part);
     return part;
 }
@@ -297,47 +283,6 @@ std::vector<kernel::CrtComposition> compileCompositions(const std::vector<const 
                 record.walled = !material->transmits();
             }
             needed |= mapped || material->isComposed() || !material->isOpaque();
-        }
-        records.push_back(record);
-    }
-    if (!needed) records.clear();
-    return records;
-}
-
-std::vector<kernel::CrtLayers> compileLayers(const std::vector<const Material*>& materials,
-                                             const MaterialTables& tables, const SpectrumTable& spectra,
-                                             const TexturePart& textures) {
-    std::vector<kernel::CrtLayers> records;
-    bool needed = false;
-    for (const Material* material : materials) {
-        kernel::CrtLayers record{};
-        if (material && hasRoughBase(*material)) {
-            const RoughBase& base = tables.rough_bases.at(material);
-            record.base_loss = spectra.valueOf(base.loss);
-            record.base_roughness = static_cast<float>(material->diffuse_roughness);
-            record.base_scale = static_cast<float>(1 / base.most);
-            record.base_mean = static_cast<float>(base.mean);
-            needed = true;
-        }
-        if (material && hasFuzz(*material)) {
-            record.fuzz_weight = static_cast<float>(material->fuzz);
-            record.fuzz_roughness = static_cast<float>(material->fuzz_roughness);
-            record.fuzz_color = spectra.valueOf(material->fuzz_color);
-            needed = true;
-        }
-        if (material && hasClearcoat(*material)) {
-            const Clearcoat& coat = *material->clearcoat;
-            const Coat& table = coatOf(tables.coats, coat);
-            record.clear_ior = static_cast<float>(coat.ior);
-            record.clear_roughness = static_cast<float>(coat.roughness);
-            record.clear_albedo = spectra.valueOf(table.albedo);
-            record.clear_depth = spectra.valueOf(coat.depth);
-            record.clear_internal = static_cast<float>(table.internal_reflectance);
-            record.clear_darkening = static_cast<float>(coat.darkening);
-            record.clear_base = material->roughness_texture != kNoTexture
-                                    ? textures.valueOf(material->roughness_texture)
-                                    : valueOf(coat.base_roughness);
-            needed = true;
         }
         records.push_back(record);
     }

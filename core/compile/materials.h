@@ -35,28 +35,20 @@ MaterialTables materialTablesOf(const std::vector<const Material*>& materials);
 /// The work of these tables, counted without making them.
 TableWork tableWorkOf(const std::vector<const Material*>& materials);
 
-/// The spectra that compileMaterials asks the table for.
-std::vector<const Spectrum*> spectraOfMaterials(const std::vector<const Material*>& materials,
-                                                const MaterialTables& tables);
-
 struct MaterialPart {
     std::vector<kernel::CrtMaterial> records;
+    std::vector<kernel::CrtLayers> layers;  ///< As many as materials; none where no material has any.
     std::vector<kernel::CrtValue> media;  ///< Absorption of the media that surfaces bound (kernel/medium.h).
     std::uint64_t features = 0;           ///< Of the materials that are used.
 };
 /// Bits of a medium's number in a list of media (kernel/medium.h): 1, 2, 4, 8 or 16; 0 without media.
 std::uint32_t mediumBits(std::size_t media);
 MaterialPart compileMaterials(const std::vector<const Material*>& materials, const MaterialTables& tables,
-                              const SpectrumTable& spectra, const TexturePart& textures);
+                              SpectrumTable& spectra, const TexturePart& textures);
 
 /// How the materials are composed, in their order; none where all are plain and opaque.
 std::vector<kernel::CrtComposition> compileCompositions(const std::vector<const Material*>& materials,
                                                         const TexturePart& textures);
-
-/// What they have besides, in their order; none where no material has anything.
-std::vector<kernel::CrtLayers> compileLayers(const std::vector<const Material*>& materials,
-                                             const MaterialTables& tables, const SpectrumTable& spectra,
-                                             const TexturePart& textures);
 
 /// Fills in one a triangle, by primitive id. `light_of` as of LightPart.
 void compilePrimitives(const FlatScene& flat, std::size_t scene_materials,

@@ -19,24 +19,19 @@ std::size_t SpectrumTable::Hash::operator()(const SpectrumValues& values) const 
     return XXH3_64bits(unsigned_zeros.data(), sizeof unsigned_zeros);
 }
 
-SpectrumTable::SpectrumTable(std::span<const Spectrum* const> spectra) {
-    for (const Spectrum* spectrum : spectra) {
-        if (spectrum->isConstant()) continue;
-        const SpectrumValues& values = spectrum->values;
-        if (!index_.try_emplace(values, static_cast<std::uint32_t>(index_.size())).second) continue;
-        for (const double v : values) floats_.push_back(static_cast<float>(v));
-        floats_.push_back(floats_.back());
-    }
-}
-
 kernel::CrtValue valueOf(double number) {
     // -0 has the bit of a reference.
     return std::bit_cast<kernel::CrtValue>(std::max(static_cast<float>(number), 0.0f) + 0.0f);
 }
 
-kernel::CrtValue SpectrumTable::valueOf(const Spectrum& spectrum) const {
-    return spectrum.isConstant() ? crt::valueOf(spectrum[0])
-                                 : CRT_VALUE_TABLE | index_.at(spectrum.values);
+kernel::CrtValue SpectrumTable::valueOf(const Spectrum& spectrum) {
+    if (spectrum.isConstant()) return crt::valueOf(spectrum[0]);
+    const auto [place, fresh] = index_.try_emplace(spectrum.values, count());
+    if (fresh) {
+        for (const double v : spectrum.values) floats_.push_back(static_cast<float>(v));
+        floats_.push_back(floats_.back());
+    }
+    return CRT_VALUE_TABLE | place->second;
 }
 
 }  // namespace crt

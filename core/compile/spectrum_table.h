@@ -6,7 +6,6 @@
 #include "scene/scene.h"
 
 #include <cstdint>
-#include <span>
 #include <unordered_map>
 #include <vector>
 
@@ -17,11 +16,8 @@ kernel::CrtValue valueOf(double number);
 
 class SpectrumTable {
 public:
-    /// Those that the scene needs, in their order in the blob.
-    explicit SpectrumTable(std::span<const Spectrum* const> spectra);
-
-    /// Of a spectrum that the table was made of, or one equal to it.
-    kernel::CrtValue valueOf(const Spectrum& spectrum) const;
+    /// A new spectrum comes behind those that the table has. Films depend on the order (scene_identity.h).
+    kernel::CrtValue valueOf(const Spectrum& spectrum);
     std::uint32_t count() const { return static_cast<std::uint32_t>(index_.size()); }
     /// CRT_SPECTRUM_STRIDE floats each.
     const std::vector<float>& floats() const { return floats_; }

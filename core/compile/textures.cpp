@@ -60,16 +60,6 @@ std::vector<TextureIndex> usedTextures(const Scene& scene, const std::vector<con
     return all;
 }
 
-std::vector<const Spectrum*> spectraOfTextures(const Scene& scene,
-                                               const std::vector<TextureIndex>& textures) {
-    std::vector<const Spectrum*> all;
-    for (const TextureIndex index : textures)
-        if (at(scene, index).kind == Texture::Kind::Checker)
-            for (const TextureValue& value : at(scene, index).values)
-                if (value.texture == kNoTexture) all.push_back(&value.spectrum);
-    return all;
-}
-
 std::uint64_t texelBytes(const Scene& scene, const std::vector<TextureIndex>& textures) {
     std::map<const TextureImage*, std::uint64_t> bytes;
     for (const TextureIndex index : textures)
@@ -81,7 +71,7 @@ std::uint64_t texelBytes(const Scene& scene, const std::vector<TextureIndex>& te
 }
 
 TexturePart compileTextures(const Scene& scene, const std::vector<TextureIndex>& textures,
-                            const SpectrumTable& spectra, BlobWriter& blob) {
+                            SpectrumTable& spectra, BlobWriter& blob) {
     TexturePart part;
     part.record_of.resize(scene.textures.size());
     std::map<const TextureImage*, kernel::CrtSpan> span_of;

@@ -15,10 +15,6 @@ namespace crt {
 /// The textures of the scene that the materials name, and those of their checkers, in the scene's order.
 std::vector<TextureIndex> usedTextures(const Scene& scene, const std::vector<const Material*>& materials);
 
-/// The spectra that compileTextures asks the table for.
-std::vector<const Spectrum*> spectraOfTextures(const Scene& scene,
-                                               const std::vector<TextureIndex>& textures);
-
 /// That their images take in the blob.
 std::uint64_t texelBytes(const Scene& scene, const std::vector<TextureIndex>& textures);
 
@@ -34,7 +30,7 @@ struct TexturePart {
 };
 /// Makes room in the blob for the texels, each image once.
 TexturePart compileTextures(const Scene& scene, const std::vector<TextureIndex>& textures,
-                            const SpectrumTable& spectra, BlobWriter& blob);
+                            SpectrumTable& spectra, BlobWriter& blob);
 
 /// Fills the texels in, by threads. Throws crt::Error(Scene) for files that are damaged.
 void decodeTextures(const TexturePart& part, BlobWriter& blob);
