@@ -15,7 +15,6 @@
 #include "film/error_estimate.h"
 #include "film/pooled_variance.h"
 #include "render/brightest_path.h"
-#include "render/device_film.h"
 #include "scene/yaml/scene_yaml.h"
 
 #include <fmt/format.h>

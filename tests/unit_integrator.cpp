@@ -51,10 +51,7 @@ CompiledScene makeScene(std::uint32_t width, std::uint32_t height, std::uint32_t
     return scene;
 }
 
-Film filmOf(const CompiledScene& scene) {
-    const kernel::CrtScene& header = scene.header();
-    return Film(FilmShape{header.width, header.height, header.channels, header.aovs});
-}
+Film filmOf(const CompiledScene& scene) { return Film(filmShapeOf(scene)); }
 
 double expected(std::uint32_t x, std::uint32_t y, std::uint32_t channel, std::uint64_t first,
                 std::uint64_t count) {

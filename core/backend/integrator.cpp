@@ -55,8 +55,7 @@ struct Integrator::Impl {
     bool created = false;
 
     bool has_scene = false;
-    std::uint32_t width = 0, height = 0, channels = 0;
-    bool has_primitives = false;
+    FilmShape shape;
     SampleRanges samples;  ///< In the backend's film.
     /// A cancelled or failed render leaves part of a range in the backend's film: nothing can be read until
     /// the next setScene.
@@ -211,18 +210,20 @@ struct Integrator::Impl {
     /// that is none, once in a checkpoint, would stay there for good.
     void checkContents(const Film& part) const {
         const std::uint64_t asked = part.samples.count();
+        const std::size_t values = shape.channels * std::size_t{2};
         for (std::size_t pixel = 0; pixel < part.counts.size(); ++pixel) {
-            const double* const sums = &part.sums[pixel * channels * 2];
+            const double* const sums = &part.sums[pixel * values];
             bool finite = true;  // Without a way out of the loop, so that it becomes one of vectors: films
                                  // have hundreds of millions of sums.
-            for (std::size_t i = 0; i < channels * std::size_t{2}; ++i) finite &= std::isfinite(sums[i]);
+            for (std::size_t i = 0; i < values; ++i) finite &= std::isfinite(sums[i]);
             if (finite && part.counts[pixel] <= asked) continue;
             const std::string what =
                 finite ? fmt::format("has {} samples and {} were asked for", part.counts[pixel], asked)
                        : "is not a number";
-            throw Error(ErrorKind::Internal, fmt::format("backend '{}' broke the contract: pixel {},{} of "
-                                                         "its film {}; what was rendered before is kept",
-                                                         backend.name, pixel % width, pixel / width, what));
+            throw Error(ErrorKind::Internal,
+                        fmt::format("backend '{}' broke the contract: pixel {},{} of "
+                                    "its film {}; what was rendered before is kept",
+                                    backend.name, pixel % shape.width, pixel / shape.width, what));
         }
     }
 
@@ -230,9 +231,9 @@ struct Integrator::Impl {
     void fill(Film& film) {
         CrtFilmView view{};
         view.struct_size = sizeof(view);
-        view.width = width;
-        view.height = height;
-        view.channels = channels;
+        view.width = shape.width;
+        view.height = shape.height;
+        view.channels = shape.channels;
         view.sums = film.sums.data();
         view.counts = film.counts.data();
         view.primitives = film.primitives.empty() ? nullptr : film.primitives.data();
@@ -288,10 +289,14 @@ CompileOptions compileOptionsFor(const LoadedBackend& backend) {
     return {.accelerator_reach = acceleratorReach(backend)};
 }
 
+FilmShape filmShapeOf(const CompiledScene& compiled) {
+    const kernel::CrtScene& header = compiled.header();
+    return {header.width, header.height, header.channels, header.aovs, compiled.spectral_channels};
+}
+
 void Integrator::setScene(const CompiledScene& scene, const std::function<void(double)>& progress) {
     Impl& self = *impl_;
-    const kernel::CrtScene& header = scene.header();
-    const std::uint64_t lacking = header.features & ~self.backend.table->features;
+    const std::uint64_t lacking = scene.header().features & ~self.backend.table->features;
     if (lacking != 0) {
         throw Error(ErrorKind::Backend, fmt::format("backend '{}' cannot render this scene: it lacks {}",
                                                     self.backend.name, featureNames(lacking)));
@@ -315,10 +320,7 @@ void Integrator::setScene(const CompiledScene& scene, const std::function<void(d
         show, "set_scene", [&] { return self.table.set_scene(self.table.state, &blob); });
     if (self.progress_error) std::rethrow_exception(std::exchange(self.progress_error, nullptr));
     self.check(status);
-    self.width = header.width;
-    self.height = header.height;
-    self.channels = header.channels;
-    self.has_primitives = (header.aovs & kAovPrimitive) != 0;
+    self.shape = filmShapeOf(scene);
     self.samples = {};
     self.film_is_whole = true;
     self.has_scene = true;
@@ -340,8 +342,8 @@ bool Integrator::render(const RenderRange& range, const std::function<bool(doubl
 
     CrtRenderRange request{};
     request.struct_size = sizeof(request);
-    request.x1 = self.width;
-    request.y1 = self.height;
+    request.x1 = self.shape.width;
+    request.y1 = self.shape.height;
     request.first_sample = range.first_sample;
     request.sample_count = range.sample_count;
 
@@ -363,9 +365,9 @@ void Integrator::readFilm(Film& film) {
     if (!self.film_is_whole)
         throw Error(ErrorKind::Internal,
                     "the film holds part of a cancelled or failed range and cannot be read");
-    const FilmShape& shape = film.shape();
-    if (shape.width != self.width || shape.height != self.height || shape.channels != self.channels ||
-        ((shape.aovs & kAovPrimitive) != 0) != self.has_primitives) {
+    const FilmShape &shape = film.shape(), &own = self.shape;
+    if (shape.width != own.width || shape.height != own.height || shape.channels != own.channels ||
+        ((shape.aovs ^ own.aovs) & kAovPrimitive) != 0) {
         throw Error(ErrorKind::Internal, "readFilm was given a film of another shape than the scene's");
     }
 

@@ -25,6 +25,9 @@ struct IntegratorOptions {
 /// What a scene for this backend need not bring.
 CompileOptions compileOptionsFor(const LoadedBackend& backend);
 
+/// The shape of a film of this scene.
+FilmShape filmShapeOf(const CompiledScene& compiled);
+
 /// Samples of all pixels.
 struct RenderRange {
     std::uint64_t first_sample = 0;

@@ -174,9 +174,4 @@ void DeviceFilm::readFilm(Film& film) {
     fixed_seconds_ += adding.seconds();
 }
 
-FilmShape filmShapeOf(const CompiledScene& compiled) {
-    const kernel::CrtScene& header = compiled.header();
-    return {header.width, header.height, header.channels, header.aovs, compiled.spectral_channels};
-}
-
 }  // namespace crt

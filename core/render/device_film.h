@@ -66,7 +66,4 @@ private:
     double fixed_seconds_ = 0;
 };
 
-/// The shape of a film of this scene.
-FilmShape filmShapeOf(const CompiledScene& compiled);
-
 }  // namespace crt

@@ -46,29 +46,16 @@ CompiledScene Session::compile(const Scene& scene, std::uint32_t aovs) const {
     return compileScene(scene, aovs, compileOptionsFor(backend_));
 }
 
-void Session::setScene(const CompiledScene& compiled, const std::function<void(double)>& progress) {
-    openDevice();
-    shape_.reset();
-    group_->setScene(compiled, progress);
-    shape_ = filmShapeOf(compiled);
-}
-
-void Session::render(const RenderRange& range, const std::function<void(double)>& progress) {
-    group().render(range, progress);
-}
-
-Film Session::film() {
-    if (!shape_) throw Error(ErrorKind::Internal, "a session without a scene has no film");
-    Film film(*shape_);
-    group_->readFilm(film);
-    return film;
-}
-
 Film renderFilm(Session& session, const Scene& scene, const FilmRequest& request,
                 const std::function<void(double)>& progress) {
-    session.setScene(session.compile(scene, request.aovs));
-    session.render({.first_sample = request.first_sample, .sample_count = request.samples}, progress);
-    return session.film();
+    session.openDevice();
+    const CompiledScene compiled = session.compile(scene, request.aovs);
+    DeviceGroup& devices = session.group();
+    devices.setScene(compiled);
+    devices.render({.first_sample = request.first_sample, .sample_count = request.samples}, progress);
+    Film film(filmShapeOf(compiled));
+    devices.readFilm(film);
+    return film;
 }
 
 }  // namespace crt

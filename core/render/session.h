@@ -1,5 +1,4 @@
-/// A backend at work: everything in crt that renders does so through a Session, or through SceneOnDevices
-/// (render.h), which has one.
+/// An open backend with its devices. Everything in crt that renders has one.
 #pragma once
 
 #include "backend/device_group.h"
@@ -7,20 +6,18 @@
 #include "backend/loader.h"
 #include "compile/compile.h"
 #include "film/film.h"
-#include "render/device_film.h"
 #include "scene/scene.h"
 
 #include <cstdint>
 #include <functional>
 #include <future>
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
 namespace crt {
 
-/// Opens a backend and its device once, renders one scene after another. Sessions share nothing: each thread
+/// Opens a backend and its devices once, for one scene after another. Sessions share nothing: each thread
 /// may have its own. Throws crt::Error as Integrator does.
 class Session {
 public:
@@ -30,7 +27,7 @@ public:
 
     const LoadedBackend& backend() const { return backend_; }
 
-    /// Opens the device, or the devices, which the first setScene() does otherwise.
+    /// Opens the device, or the devices, unless they are open.
     void openDevice();
     /// Begins to, on a thread of its own, and returns at once: opening a driver takes as long as compiling a
     /// scene. What goes wrong is thrown by openDevice().
@@ -41,17 +38,9 @@ public:
     /// Without what this backend brings itself.
     CompiledScene compile(const Scene& scene, std::uint32_t aovs = 0) const;
 
-    /// The scene from now on, with an empty film. `progress` gets [0,1] from backends that tell how far they
-    /// are.
-    void setScene(const CompiledScene& compiled, const std::function<void(double)>& progress = {});
-    /// Adds a range of samples to the backend's film. `progress` gets [0,1].
-    void render(const RenderRange& range, const std::function<void(double)>& progress = {});
-    /// Everything rendered since setScene().
-    Film film();
-
-    CrtBackendReport report() { return group().report(); }
-    /// Requires openDevice() or setScene().
+    /// The devices, which render. Requires openDevice().
     DeviceGroup& group();
+    CrtBackendReport report() { return group().report(); }
 
 private:
     struct Opened {
@@ -64,7 +53,6 @@ private:
     IntegratorOptions options_;
     std::vector<CrtDevice> devices_;
     std::unique_ptr<DeviceGroup> group_;
-    std::optional<FilmShape> shape_;
     std::future<Opened> opening_;  ///< Last: its end is waited for first.
 };
 

@@ -4,6 +4,7 @@
 
 #include "backend/integrator.h"
 #include "base/listener.h"
+#include "render/device_film.h"
 #include "render/session.h"
 #include "view/board.h"
 #include "view/camera_moves.h"

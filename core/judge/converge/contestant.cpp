@@ -158,9 +158,11 @@ void Contestant::keepPicture(const Film& film, const Image& image, double mean_l
 /// The same seed and samples are the same bits as that replicate's look was.
 void Contestant::renderPicture(std::uint32_t replicate, std::uint64_t samples) {
     scene_.sampler.seed = seed_ + 1 + replicate;
-    session_->setScene(session_->compile(scene_));
-    session_->render({.first_sample = 0, .sample_count = samples});
-    const Film film = session_->film();
+    const CompiledScene compiled = session_->compile(scene_);
+    session_->group().setScene(compiled);
+    session_->group().render({.first_sample = 0, .sample_count = samples});
+    Film film(filmShapeOf(compiled));
+    session_->group().readFilm(film);
     const Image image = resolveImage(film, developmentOf(scene_).forFloats(), 0);
     keepPicture(film, image, stats::meanLuminance(looks_.at(samples).at(replicate)));
 }
@@ -169,16 +171,16 @@ void Contestant::renderPicture(std::uint32_t replicate, std::uint64_t samples) {
 /// the start and not to a replicate.
 void Contestant::warmUp(const CompiledScene& compiled) {
     const Stopwatch start;
-    session_->render({.first_sample = 0, .sample_count = 1});
+    session_->group().render({.first_sample = 0, .sample_count = 1});
     configuration_.stages.first_sample = start.seconds();
     start_seconds_ += configuration_.stages.first_sample;
-    session_->setScene(compiled);
+    session_->group().setScene(compiled);
 }
 
 void Contestant::prepare() {
     const Stopwatch setup;
     const CompiledScene compiled = session_->compile(scene_);
-    session_->setScene(compiled);
+    session_->group().setScene(compiled);
     start_seconds_ += setup.seconds();
     if (configuration_.width == 0) describe(compiled);
     warmUp(compiled);
@@ -218,7 +220,7 @@ bool Contestant::replicate(std::uint32_t replicate, std::uint64_t most_samples, 
                            const std::function<void(const Row&)>& found, const std::function<bool()>& stop) {
     scene_.sampler.seed = seed_ + 1 + replicate;
     const CompiledScene compiled = session_->compile(scene_);
-    session_->setScene(compiled);
+    session_->group().setScene(compiled);
     const Stopwatch start;
 
     const CrtBackendReport before = session_->report();
@@ -227,13 +229,14 @@ bool Contestant::replicate(std::uint32_t replicate, std::uint64_t most_samples, 
     for (std::uint64_t done = 0, next = 1; done < most_samples; next *= 2) {
         if (stop()) return false;
         const Stopwatch step;
-        session_->render({.first_sample = done, .sample_count = next - done});
+        session_->group().render({.first_sample = done, .sample_count = next - done});
         const double step_seconds = step.seconds();
         wall += step_seconds;
         done = next;
         if (exploring) samples_reached_ = done;
 
-        const Film film = session_->film();
+        Film film(filmShapeOf(compiled));
+        session_->group().readFilm(film);
         // The next doubling takes as long as all before it, and its look some more.
         const bool last =
             done * 2 > most_samples || (exploring && start.seconds() + 2.2 * step_seconds > seconds);

@@ -189,14 +189,14 @@ std::optional<RenderedFolds> renderFolds(const Scene& scene, Session& session,
     RenderedFolds folds{Film(shape), {}, {true, brightestPathOf(compiled)}};
     std::uint64_t per_fold = request.samples / kFolds;
     for (std::uint32_t fold = 0; fold < kFolds; ++fold) {
-        session.setScene(compiled);
+        session.group().setScene(compiled);
         const std::uint64_t first = std::uint64_t{fold} << 44;
         std::uint64_t done = 0;
         for (std::uint64_t chunk = 1; per_fold == 0 || done < per_fold;) {
             if (watch.stopRequested()) return std::nullopt;
             const double before = rendering.seconds();
             if (per_fold > 0) chunk = std::min(chunk, per_fold - done);
-            session.render({.first_sample = first + done, .sample_count = chunk});
+            session.group().render({.first_sample = first + done, .sample_count = chunk});
             done += chunk;
             const double took = std::max(rendering.seconds() - before, 1e-6);
             state.elapsed_seconds = rendering.seconds();
@@ -209,7 +209,8 @@ std::optional<RenderedFolds> renderFolds(const Scene& scene, Session& session,
                     std::max(done, affordable(request.seconds / kFolds, took / static_cast<double>(chunk)));
             if (took < 0.25) chunk *= 2;
         }
-        const Film part = session.film();
+        Film part(shape);
+        session.group().readFilm(part);
         if (part.invalidSamples() > 0)
             throw Error(
                 ErrorKind::Device,
