@@ -179,7 +179,7 @@ MaterialTables materialTablesOf(const std::vector<const Material*>& materials) {
 namespace {
 
 /// The glass behind the surface of a material or of a mix; null if there is none.
-/// All glass of a mix has the same inside (ObjectReader::checkInsides).
+/// All glass of a mix has the same inside (MaterialReader::checkInsides).
 const Material* glassOf(const Material& material, const std::vector<const Material*>& materials) {
     if (material.type == MaterialType::Dielectric || material.type == MaterialType::RoughDielectric)
         return &material;

@@ -1,6 +1,6 @@
-/// The part of ObjectReader that reads what meshes have at their vertices beside positions and normals, and
+/// The part of MeshReader that reads what meshes have at their vertices beside positions and normals, and
 /// asks whether a mesh has what its materials need.
-#include "scene/yaml/scene_objects.h"
+#include "scene/yaml/scene_meshes.h"
 
 #include "base/log.h"
 
@@ -77,7 +77,7 @@ std::vector<std::vector<double>> readPerVertex(const SectionReader& mesh, std::s
 
 }  // namespace
 
-void ObjectReader::readAttributes(const SectionReader& section, Mesh& mesh) const {
+void MeshReader::readAttributes(const SectionReader& section, Mesh& mesh) const {
     const std::size_t positions = mesh.positions.size();
     for (const std::vector<double>& uv : readPerVertex(section, "uvs", "texture coordinates", positions))
         mesh.uvs.push_back({uv[0], uv[1]});
@@ -93,7 +93,7 @@ void ObjectReader::readAttributes(const SectionReader& section, Mesh& mesh) cons
         section.error("color_space", "there are no 'colors' that it could be about");
 }
 
-void ObjectReader::checkTextures(const SectionReader& section, const Object& object) const {
+void MeshReader::checkTextures(const SectionReader& section, const Object& object) const {
     if (scene_.textures.empty()) return;
     const Mesh& mesh = scene_.meshes[object.mesh];  // Of a shape it is empty.
     std::set<std::int32_t> materials(mesh.material.begin(), mesh.material.end());
@@ -137,7 +137,7 @@ void ObjectReader::checkTextures(const SectionReader& section, const Object& obj
 
 /// Images that the materials of an OBJ name take the place of what they stand for where they can be read;
 /// else that stays, with a warning.
-void ObjectReader::addMaps(LoadedMesh& loaded, const std::string& path) {
+void MeshReader::addMaps(LoadedMesh& loaded, const std::string& path) {
     std::map<std::string_view, std::size_t> without_uvs;
     const auto add = [&](const std::optional<MtlMap>& map, std::string_view keyword, const TexelUse& use,
                          std::string_view instead, TextureIndex& into) {

@@ -1,6 +1,6 @@
-/// The part of ObjectReader that reads materials made of others: names looked up, since they may come later
-/// in the file, and what cannot be refused.
-#include "scene/yaml/scene_objects.h"
+/// The part of MaterialReader that reads materials made of others: names looked up, since they may come
+/// later in the file, and what cannot be refused.
+#include "scene/yaml/scene_materials.h"
 
 #include <fmt/format.h>
 
@@ -10,7 +10,7 @@
 
 namespace crt {
 /// Of the material that is being read, which gets the next number.
-void ObjectReader::readParts(const SectionReader& material) {
+void MaterialReader::readParts(const SectionReader& material) {
     std::array<PartName, 2>& parts = parts_[static_cast<std::int32_t>(scene_.materials.size())];
     if (variantWord(material.schema()) == "two_sided") {
         constexpr const char* kSides[] = {"front", "back"};
@@ -36,13 +36,13 @@ void ObjectReader::readParts(const SectionReader& material) {
     }
 }
 
-void ObjectReader::resolveParts() {
+void MaterialReader::resolveParts() {
     const std::size_t errors_before = out_.count();
     for (const auto& [index, names] : parts_)
         for (std::size_t i = 0; i < 2; ++i)
             if (!names[i].name.empty())
                 scene_.materials[static_cast<std::size_t>(index)].parts[i] =
-                    findMaterial(names[i].name, names[i].place, false).value_or(-1);
+                    find(names[i].name, names[i].place, false).value_or(-1);
     if (out_.count() != errors_before) return;
     for (const auto& [index, names] : parts_) {
         checkParts({index});
@@ -52,7 +52,7 @@ void ObjectReader::resolveParts() {
 }
 
 /// The glass that a material is or is mixed of, all of it.
-std::vector<const Material*> ObjectReader::glassOf(const Material& material) const {
+std::vector<const Material*> MaterialReader::glassOf(const Material& material) const {
     if (material.type == MaterialType::Dielectric || material.type == MaterialType::RoughDielectric)
         return {&material};
     std::vector<const Material*> all;
@@ -65,7 +65,7 @@ std::vector<const Material*> ObjectReader::glassOf(const Material& material) con
 
 /// Light enters a body by one part of a mix and may leave it by another: both must mean the same inside, or
 /// the n² that one gives is not the n² that the other takes.
-void ObjectReader::checkInsides(std::int32_t whole, const YamlPlace& place) const {
+void MaterialReader::checkInsides(std::int32_t whole, const YamlPlace& place) const {
     const Material& material = scene_.materials[static_cast<std::size_t>(whole)];
     const std::vector<const Material*> all = glassOf(material);
     const auto absorption = [](const Material& glass) {
@@ -83,7 +83,7 @@ void ObjectReader::checkInsides(std::int32_t whole, const YamlPlace& place) cons
 }
 
 /// Of what an openpbr material is mixed of, too, which has no names.
-bool ObjectReader::transmits(const Material& part) const {
+bool MaterialReader::transmits(const Material& part) const {
     const auto index = static_cast<std::int32_t>(&part - scene_.materials.data());
     if (part.type != MaterialType::Mix || parts_.contains(index)) return part.transmits();
     return std::any_of(part.parts.begin(), part.parts.end(), [&](std::int32_t i) {
@@ -92,7 +92,7 @@ bool ObjectReader::transmits(const Material& part) const {
 }
 
 /// `way`: from a material to one that it is made of, by way of others.
-void ObjectReader::checkParts(const std::vector<std::int32_t>& way) {
+void MaterialReader::checkParts(const std::vector<std::int32_t>& way) {
     const auto found = parts_.find(way.back());
     if (found == parts_.end()) return;
     const auto at = [&](std::int32_t index) -> const Material& {

@@ -1,5 +1,5 @@
-/// The part of ObjectReader that reads objects with `gltf`.
-#include "scene/yaml/scene_objects.h"
+/// The part of MeshReader that reads objects with `gltf`.
+#include "scene/yaml/scene_meshes.h"
 
 #include "base/log.h"
 
@@ -9,7 +9,7 @@
 
 namespace crt {
 
-Mesh ObjectReader::gltfMesh(const SectionReader& form, const std::string& path, const GltfPrimitive& which) {
+Mesh MeshReader::gltfMesh(const SectionReader& form, const std::string& path, const GltfPrimitive& which) {
     GltfFile& file = gltf_.open(path);
     if (bool allow = false; form.read("allow_outside", allow) && allow) file.allowOutside();
     std::uint64_t without_area = 0;
@@ -24,14 +24,14 @@ Mesh ObjectReader::gltfMesh(const SectionReader& form, const std::string& path, 
 }
 
 /// Once a file.
-void ObjectReader::tellGltf() const {
+void MeshReader::finish() const {
     for (const auto& [path, lost] : without_area_)
         logWarning("{}: {} triangles of {} primitives have no area and were left out", path, lost.triangles,
                    lost.primitives);
 }
 
 /// Nothing if it is invalid; reports the error.
-std::optional<std::uint32_t> ObjectReader::readGltf(const SectionReader& object) {
+std::optional<std::uint32_t> MeshReader::readGltf(const SectionReader& object) {
     const std::optional<SectionReader> form =
         object.section("gltf", fmt::format("the gltf of {}", object.subject()));
     refuseObjKeys(object);

@@ -1,6 +1,6 @@
-/// The part of ObjectReader that reads objects with `obj` or `ply`: which of their materials are the file's,
+/// The part of MeshReader that reads objects with `obj` or `ply`: which of their materials are the file's,
 /// and which the scene's.
-#include "scene/yaml/scene_objects.h"
+#include "scene/yaml/scene_meshes.h"
 
 #include "base/log.h"
 #include "base/stage.h"
@@ -16,7 +16,7 @@
 namespace crt {
 
 /// How an object wants the file of its mesh; `material` is the value of the key, empty where it is left out.
-ObjectReader::MeshUse ObjectReader::readMeshUse(const SectionReader& object, const std::string& material) {
+MeshReader::MeshUse MeshReader::readMeshUse(const SectionReader& object, const std::string& material) {
     MeshUse use;
     use.file.ply = object.has("ply");
     use.file.normals = readNormals(object);
@@ -44,21 +44,21 @@ ObjectReader::MeshUse ObjectReader::readMeshUse(const SectionReader& object, con
 }
 
 /// Keys that only an object with `obj` may have.
-void ObjectReader::refuseObjKeys(const SectionReader& object) const {
+void MeshReader::refuseObjKeys(const SectionReader& object) const {
     if (object.has("parts")) object.error("parts", "only an OBJ has parts that have names");
     if (object.has("override")) object.error("override", "only an OBJ has materials to override");
     if (object.has("mtl")) object.error("mtl", "only an OBJ has an MTL");
 }
 
 /// Keys that only an object with a mesh may have.
-void ObjectReader::refuseMeshKeys(const SectionReader& object) const {
+void MeshReader::refuseMeshKeys(const SectionReader& object) const {
     refuseObjKeys(object);
     for (const char* key : {"normals", "crease_angle_deg"})
         if (object.has(key)) object.error(key, "a shape has normals of its own");
     if (object.has("vertex_colors")) object.error("vertex_colors", "this is about the colours in a PLY");
 }
 
-ObjectReader::NormalsUse ObjectReader::readNormals(const SectionReader& object) const {
+MeshReader::NormalsUse MeshReader::readNormals(const SectionReader& object) const {
     NormalsUse use;
     object.readEnum("normals", use.source);
     object.read("crease_angle_deg", use.crease_angle_deg);
@@ -69,7 +69,7 @@ ObjectReader::NormalsUse ObjectReader::readNormals(const SectionReader& object) 
     return {.source = use.source};
 }
 
-void ObjectReader::setNormals(Mesh& mesh, const NormalsUse& use, const std::string& subject) {
+void MeshReader::setNormals(Mesh& mesh, const NormalsUse& use, const std::string& subject) {
     if (use.source == NormalsUse::Source::File) return;
     mesh.normals = {};
     mesh.normal_index = {};
@@ -78,14 +78,14 @@ void ObjectReader::setNormals(Mesh& mesh, const NormalsUse& use, const std::stri
     makeSmoothNormals(mesh, use.crease_angle_deg);
 }
 
-std::unique_ptr<LoadedMesh> ObjectReader::takeOffered(const FileUse& use) {
+std::unique_ptr<LoadedMesh> MeshReader::takeOffered(const FileUse& use) {
     std::error_code unknown;
     const bool taken = offered_ && use.obj == ObjOptions{} && use.colors == PlyOptions{}.color &&
                        std::filesystem::equivalent(offered_->files.front(), use.path, unknown);
     return taken ? std::move(offered_) : nullptr;
 }
 
-LoadedMesh* ObjectReader::load(const SectionReader& object, const FileUse& use) {
+LoadedMesh* MeshReader::load(const SectionReader& object, const FileUse& use) {
     const auto [file, fresh] = loaded_.try_emplace(use);
     if (fresh) {
         try {
@@ -105,7 +105,7 @@ LoadedMesh* ObjectReader::load(const SectionReader& object, const FileUse& use) 
     return file->second.get();
 }
 
-std::optional<std::uint32_t> ObjectReader::readMeshFile(const SectionReader& object, MeshUse use) {
+std::optional<std::uint32_t> MeshReader::readMeshFile(const SectionReader& object, MeshUse use) {
     const std::string_view key = use.file.ply ? "ply" : "obj";
     std::string name;
     if (!object.read(key, name)) return std::nullopt;
@@ -130,7 +130,7 @@ std::optional<std::uint32_t> ObjectReader::readMeshFile(const SectionReader& obj
 
 /// The mesh of a file: moved out of it for the first mesh of the scene that wants it, a copy of that for
 /// others.
-Mesh ObjectReader::takeMesh(LoadedMesh& loaded, std::uint32_t number) {
+Mesh MeshReader::takeMesh(LoadedMesh& loaded, std::uint32_t number) {
     const auto [taken, first] = taken_.try_emplace(&loaded, TakenMesh{number, {}});
     if (first) {
         taken->second.material = loaded.mesh.material;
@@ -144,7 +144,7 @@ Mesh ObjectReader::takeMesh(LoadedMesh& loaded, std::uint32_t number) {
 
 /// The mesh, as number `mesh_number` of the scene, with its materials put into the scene, or those of the
 /// object's parts in their place.
-Mesh ObjectReader::withSceneMaterials(LoadedMesh& loaded, std::uint32_t mesh_number,
+Mesh MeshReader::withSceneMaterials(LoadedMesh& loaded, std::uint32_t mesh_number,
                                       const SectionReader& object, const MeshUse& use) {
     Mesh mesh = takeMesh(loaded, mesh_number);
     PartFinder parts(loaded, use.parts);
@@ -187,7 +187,7 @@ Mesh ObjectReader::withSceneMaterials(LoadedMesh& loaded, std::uint32_t mesh_num
 }
 
 /// Every face must have a material: one of the OBJ's, or that of the object.
-void ObjectReader::checkMaterials(const SectionReader& object, const LoadedMesh& loaded, const Mesh& mesh,
+void MeshReader::checkMaterials(const SectionReader& object, const LoadedMesh& loaded, const Mesh& mesh,
                                   const MeshUse& use) const {
     if (use.file.ply) return;  // That of the object, which must be there.
     const std::size_t triangles = mesh.triangles.size();
@@ -203,6 +203,7 @@ void ObjectReader::checkMaterials(const SectionReader& object, const LoadedMesh&
         return;
     }
     if (bare == 0) return;
+    const std::vector<std::string>& names = materials_.names();
     const std::string reason =
         loaded.missing_files.empty()
             ? ""
@@ -211,9 +212,9 @@ void ObjectReader::checkMaterials(const SectionReader& object, const LoadedMesh&
         object.has("material") ? "material" : "obj",
         fmt::format("{} of {} triangles of {} have no material{}; give them one with 'material: NAME'", bare,
                     triangles, object.subject(), reason),
-        material_names_.empty()
+        names.empty()
             ? "for instance 'materials: {grey: {type: diffuse, reflectance: 0.5}}' and 'material: grey'"
-            : fmt::format("for instance 'material: {}'", material_names_.front()));
+            : fmt::format("for instance 'material: {}'", names.front()));
 }
 
 }  // namespace crt

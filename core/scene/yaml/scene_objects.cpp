@@ -1,4 +1,3 @@
-// Over 450 lines: one class, which reads objects with the materials and placements that they name.
 #include "scene/yaml/scene_objects.h"
 
 #include "base/log.h"
@@ -13,7 +12,6 @@
 namespace crt {
 namespace {
 
-bool isZero(const Vec3d& v) { return v[0] == 0 && v[1] == 0 && v[2] == 0; }
 bool allFinite(const Matrix4d& m) {
     return std::all_of(m.begin(), m.end(), [](double v) { return std::isfinite(v); });
 }
@@ -52,208 +50,13 @@ double relativeVolume(const Matrix4d& m) {
     Vec3d rows[3];
     for (std::size_t r = 0; r < 3; ++r) {
         const Vec3d row{m[4 * r], m[4 * r + 1], m[4 * r + 2]};
-        if (isZero(row)) return 0;
+        if (row == Vec3d{}) return 0;
         rows[r] = normalised(row);
     }
     return dot(rows[0], cross(rows[1], rows[2]));
 }
 
-/// Triples in a list of lists.
-std::optional<std::vector<Vec3d>> readPoints(const SectionReader& mesh, std::string_view key,
-                                             const char* one) {
-    const YamlNode* list = mesh.list(key);
-    if (list == nullptr) return std::nullopt;
-    const KeySchema& row = *mesh.schema().find(key);
-    std::vector<Vec3d> points;
-    points.reserve(list->items.size());
-    bool good = true;
-    std::vector<double> values;
-    for (std::size_t i = 0; i < list->items.size(); ++i) {
-        const YamlNode& item = *list->items[i];
-        good &= readNumbers(mesh.diagnostics(), item, item.place, row, fmt::format("{} {}", one, i), values);
-        if (good) points.push_back({values[0], values[1], values[2]});
-    }
-    if (!good) return std::nullopt;
-    return points;
-}
-
 }  // namespace
-
-ObjectReader::ObjectReader(Diagnostics& out, SceneFiles& files, SpectrumReader& spectra,
-                           TextureReader& textures, GltfFiles& gltf, Scene& scene)
-    : out_(out),
-      files_(files),
-      spectra_(spectra),
-      textures_(textures),
-      gltf_(gltf),
-      scene_(scene),
-      limit_(scene.input_bytes) {}
-
-ObjectReader::~ObjectReader() = default;
-
-void ObjectReader::requireRoom(const YamlPlace& place) {
-    std::string why = limit_.refusal(placements_, "placements", kBytesPerPlacement);
-    if (why.empty()) why = limit_.refusal(triangles_, "triangles", kBytesPerTriangle);
-    if (why.empty()) return;
-    out_.error(place, why);
-    out_.throwIfFailed();
-}
-
-// ---- Materials ------------------------------------------------------------------------------------------
-
-void ObjectReader::readMaterials(const YamlNode& map) {
-    for (const YamlEntry& entry : map.entries) readMaterial(entry);
-    resolveParts();
-}
-
-void ObjectReader::readMaterial(const YamlEntry& entry) {
-    NamedMaterial& named = materials_[entry.key];
-    named.place = entry.key_place;
-    material_names_.push_back(entry.key);
-    if (entry.key == "from_mtl" || entry.key.empty() || looksLikeNumber(entry.key)) {
-        out_.error(entry.key_place,
-                   fmt::format("'{}' cannot name a material: where it is used it would mean something else",
-                               entry.key));
-        return;
-    }
-    const std::optional<SectionReader> section =
-        openVariant(out_, *entry.value, entry.place, "material", fmt::format("material '{}'", entry.key));
-    if (!section) return;
-
-    Material material;
-    material.name = entry.key;
-    material.place = entry.key_place.resolved();
-    const auto take = [&](std::string_view key, SpectrumUse use, Spectrum& into) {
-        if (std::optional<Spectrum> s = spectra_.read(*section, key, use)) into = *std::move(s);
-    };
-    const auto takeReflectance = [&] {
-        if (TextureReader::isTexture(*section, "reflectance"))
-            material.reflectance_texture =
-                textures_.read(*section, "reflectance", TexelKind::Spectra).value_or(kNoTexture);
-        else
-            take("reflectance", SpectrumUse::Reflectance, material.reflectance);
-    };
-    const auto takeNumber = [&](std::string_view key, double& number, TextureIndex& texture) {
-        if (TextureReader::isTexture(*section, key))
-            texture = textures_.read(*section, key, TexelKind::Numbers).value_or(kNoTexture);
-        else
-            section->read(key, number);
-    };
-    const auto takeRoughness = [&] {
-        takeNumber("roughness", material.roughness, material.roughness_texture);
-    };
-    const std::string kind = variantWord(section->schema());
-    for (const auto& [type, word] : kMaterialNames)
-        if (kind == word) material.type = type;
-    for (const auto& [type, word] : kComposedNames)
-        if (kind == word) material.type = type;
-    const bool open_pbr = kind == "openpbr";
-    takeNumber(open_pbr ? "geometry_opacity" : "opacity", material.opacity, material.opacity_texture);
-    if (section->schema().find("normal_map") != nullptr)
-        if (const auto map =
-                section->section("normal_map", fmt::format("the normal map of {}", section->subject()))) {
-            material.normal_texture = textures_.readNormalMap(*map);
-            map->read("strength", material.normal_strength);
-        }
-    const auto add = [&] {
-        named.index = static_cast<std::int32_t>(scene_.materials.size());
-        scene_.materials.push_back(std::move(material));
-    };
-    if (open_pbr) {
-        readOpenPbr(*section, material);
-        add();
-        return;
-    }
-    switch (material.type) {
-        case MaterialType::Diffuse:
-            section->read("roughness", material.diffuse_roughness);
-            takeReflectance();
-            makeRoughDiffuse(material);
-            break;
-        case MaterialType::Mirror: takeReflectance(); break;
-        case MaterialType::RoughConductor: takeRoughness(); [[fallthrough]];
-        case MaterialType::Conductor: {
-            std::string metal;
-            if (section->readWord("metal", metal))
-                std::tie(material.eta, material.k) = metalIndex(metal).value();
-            take("eta", SpectrumUse::Index, material.eta);
-            take("k", SpectrumUse::Index, material.k);
-            break;
-        }
-        case MaterialType::RoughDielectric: takeRoughness(); [[fallthrough]];
-        case MaterialType::Dielectric:
-            material.absorption = spectra_.read(*section, "absorption", SpectrumUse::Absorption);
-            [[fallthrough]];
-        case MaterialType::ThinDielectric: take("ior", SpectrumUse::Index, material.eta); break;
-        case MaterialType::Mix:
-            takeNumber("amount", material.amount, material.amount_texture);
-            [[fallthrough]];
-        case MaterialType::TwoSided: readParts(*section); break;
-        case MaterialType::Plastic: {
-            double ior = 1.5;
-            section->read("ior", ior);
-            section->read("roughness", material.roughness);
-            material.eta = constantSpectrum(ior);
-            takeReflectance();
-            break;
-        }
-    }
-    if (material.absorption && !material.isOpaque())
-        section->error("opacity",
-                       "a body that absorbs is closed: where its surface is not there, light would enter it "
-                       "unseen",
-                       "leave 'opacity' or 'absorption' out");
-    if (section->schema().find("thin_film") != nullptr) readThinFilm(*section, material);
-    if (section->schema().find("roughness_anisotropy") != nullptr) readAnisotropy(*section, material);
-    add();
-}
-
-void ObjectReader::readThinFilm(const SectionReader& section, Material& material) {
-    if (!section.has("thin_film")) return;
-    const std::optional<SectionReader> film =
-        section.section("thin_film", fmt::format("the film of material '{}'", material.name));
-    if (!film) return;
-    film->read("thickness_nm", material.film_thickness_nm);
-    if (std::optional<Spectrum> index = spectra_.read(*film, "ior", SpectrumUse::Index))
-        material.film_index = *std::move(index);
-    if (!TextureReader::isTexture(*film, "relative_thickness")) {
-        double relative = 1;
-        film->read("relative_thickness", relative);
-        material.film_thickness_nm *= relative;
-    } else if (material.type == MaterialType::RoughDielectric) {
-        film->error("relative_thickness",
-                    "a film on a rough_dielectric is equally thick everywhere: what its microfacets lose is "
-                    "tabulated for one thickness",
-                    "leave 'relative_thickness' out, give a number, or take a dielectric");
-    } else {
-        material.film_texture =
-            textures_.read(*film, "relative_thickness", TexelKind::Numbers).value_or(kNoTexture);
-    }
-}
-
-std::optional<std::int32_t> ObjectReader::findMaterial(const std::string& name, const YamlPlace& place,
-                                                       bool from_mtl_possible) {
-    const auto found = materials_.find(name);
-    if (found != materials_.end()) {
-        found->second.used = true;
-        if (found->second.index < 0) return std::nullopt;
-        return found->second.index;
-    }
-    std::vector<std::string> known =
-        out_.worthSuggesting(material_names_.size()) ? material_names_ : std::vector<std::string>();
-    if (from_mtl_possible) known.push_back("from_mtl");
-    out_.error(place, fmt::format("there is no material '{}'", name),
-               out_.worthSuggesting(known.size()) ? didYouMean(name, known) : std::string());
-    return std::nullopt;
-}
-
-void ObjectReader::finish() const {
-    UnusedNames unused("material", "materials");
-    for (const std::string& name : material_names_)
-        if (const NamedMaterial& material = materials_.at(name); !material.used)
-            unused.add(name, material.place);
-    unused.finish();
-}
 
 // ---- Placements -----------------------------------------------------------------------------------------
 
@@ -295,7 +98,7 @@ std::optional<Matrix4d> ObjectReader::readPlacement(const YamlNode& list, const 
             double degrees = 0;
             turn->read("axis", axis);
             turn->read("angle_deg", degrees);
-            if (isZero(axis))
+            if (axis == Vec3d{})
                 turn->error("axis", "an axis of length 0 has no direction");
             else
                 m = rotation(normalised(axis), degrees);
@@ -332,8 +135,8 @@ std::vector<Matrix4d> ObjectReader::readPlacements(const SectionReader& object) 
     if (list->items.empty())
         object.error("transforms",
                      "an object with no placement is nowhere; leave 'transforms' out for one as it is");
-    placements_ += list->items.size();
-    requireRoom(object.place("transforms"));
+    room_.placements += list->items.size();
+    room_.require(object.place("transforms"), out_);
     std::vector<Matrix4d> placements;
     placements.reserve(list->items.size());
     for (std::size_t i = 0; i < list->items.size(); ++i) {
@@ -347,96 +150,11 @@ std::vector<Matrix4d> ObjectReader::readPlacements(const SectionReader& object) 
     return placements;
 }
 
-// ---- Geometry -------------------------------------------------------------------------------------------
-
-std::optional<std::uint32_t> ObjectReader::readMesh(const SectionReader& section,
-                                                    const NormalsUse& normals_use) {
-    std::optional<std::vector<Vec3d>> positions = readPoints(section, "positions", "position");
-    std::optional<std::vector<Vec3d>> normals = readPoints(section, "normals", "normal");
-    const YamlNode* faces = section.list("faces");
-    if (!positions || faces == nullptr) return std::nullopt;
-
-    Mesh mesh;
-    mesh.positions = *std::move(positions);
-    const std::size_t errors_before = out_.count();
-    if (section.has("normals") && normals) {
-        if (normals->size() != mesh.positions.size())
-            section.error("normals", fmt::format("there are {} normals for {} positions", normals->size(),
-                                                 mesh.positions.size()));
-        for (std::size_t i = 0; i < normals->size(); ++i)
-            if (isZero((*normals)[i]))
-                out_.error(section.list("normals")->items[i]->place,
-                           fmt::format("normal {} has length 0", i));
-        mesh.normals = *std::move(normals);
-    }
-    readAttributes(section, mesh);
-    if (faces->items.empty()) section.error("faces", "a mesh without faces cannot be seen");
-
-    const KeySchema& row = *section.schema().find("faces");
-    std::uint64_t dropped = 0;
-    std::vector<std::uint32_t> polygon;
-    std::vector<Vec3d> areas;  // Twice the area of each triangle of the fan, along its normal.
-    for (std::size_t f = 0; f < faces->items.size(); ++f) {
-        const YamlNode& face = *faces->items[f];
-        if (face.kind != YamlKind::List || face.items.size() < 3) {
-            expected(out_, face.place, "a list of 3 or more indices", fmt::format("face {}", f), face);
-            continue;
-        }
-        polygon.clear();
-        for (const YamlNodePtr& item : face.items) {
-            std::int64_t index = 0;
-            if (!readScalar(out_, *item, item->place, row, fmt::format("an index of face {}", f), index))
-                continue;
-            if (static_cast<std::uint64_t>(index) < mesh.positions.size())
-                polygon.push_back(static_cast<std::uint32_t>(index));
-            else
-                out_.error(item->place,
-                           fmt::format("face {} names position {}, but there are only {} (counted from 0)",
-                                       f, index, mesh.positions.size()));
-        }
-        if (polygon.size() != face.items.size()) continue;
-        triangles_ += polygon.size() - 2;
-        requireRoom(face.place);
-
-        // A fan from the first corner. A triangle that turns against the whole lies outside the polygon.
-        const Vec3d& apex = mesh.positions[polygon[0]];
-        areas.clear();
-        Vec3d sum{};
-        for (std::size_t i = 1; i + 1 < polygon.size(); ++i) {
-            areas.push_back(cross(mesh.positions[polygon[i]] - apex, mesh.positions[polygon[i + 1]] - apex));
-            sum = sum + areas.back();
-        }
-        constexpr double kRounding = 1e-9;
-        for (std::size_t i = 0; i < areas.size(); ++i) {
-            if (isZero(areas[i])) {
-                ++dropped;
-                continue;
-            }
-            if (dot(areas[i], sum) < -kRounding * dot(sum, sum)) {
-                out_.error(face.place,
-                           fmt::format("face {} is not convex; split it into convex polygons", f));
-                break;
-            }
-            mesh.triangles.push_back({polygon[0], polygon[i + 1], polygon[i + 2]});
-        }
-    }
-    if (out_.count() != errors_before) return std::nullopt;
-    if (dropped > 0) {
-        logWarning("{}: {} triangles of {} without area were left out",
-                   section.place("faces").resolved().text(), dropped, section.subject());
-    }
-    if (!mesh.normals.empty()) mesh.normal_index = mesh.triangles;
-    if (!mesh.uvs.empty()) mesh.uv_index = mesh.triangles;
-    setNormals(mesh, normals_use, section.subject());
-    scene_.meshes.push_back(std::move(mesh));
-    return static_cast<std::uint32_t>(scene_.meshes.size() - 1);
-}
-
 // ---- Objects --------------------------------------------------------------------------------------------
 
-void ObjectReader::readObjects(const YamlNode& list) {
+void ObjectReader::read(const YamlNode& list) {
     for (std::size_t i = 0; i < list.items.size(); ++i) readObject(*list.items[i], list.items[i]->place, i);
-    tellGltf();
+    meshes_.finish();
 }
 
 void ObjectReader::tellLeftOut(const Object& object, const std::string& subject) const {
@@ -465,38 +183,19 @@ void ObjectReader::readObject(const YamlNode& node, const YamlPlace& place, std:
     const bool named = material_given && material_name != "from_mtl";
     if (named)
         object.material =
-            findMaterial(material_name, section.place("material"), section.has("obj")).value_or(-1);
+            materials_.find(material_name, section.place("material"), section.has("obj")).value_or(-1);
 
-    std::optional<std::uint32_t> mesh;
     if (!section.has("obj")) {
         if (!section.has("material"))
             out_.error(place, fmt::format("'material' is missing in {}", section.subject()));
         if (material_given && !named) section.error("material", "only an OBJ has materials of its own");
     }
-    if ((section.has("obj") || section.has("ply")) && !section.has("mesh")) {
-        mesh = readMeshFile(section, readMeshUse(section, material_name));
-    } else if (section.has("gltf")) {
-        mesh = readGltf(section);
-    } else if (hasShape(section)) {
-        mesh = readShape(section, object);
-        refuseMeshKeys(section);
-    } else if (const std::optional<SectionReader> written =
-                   section.section("mesh", fmt::format("the mesh of {}", section.subject()))) {
-        const NormalsUse normals = readNormals(section);
-        const auto [known, fresh] =
-            written_meshes_.try_emplace({section.find("mesh")->value.get(), normals});
-        if (fresh) known->second = readMesh(*written, normals);
-        mesh = known->second;
-        refuseObjKeys(section);
-        if (section.has("vertex_colors"))
-            section.error("vertex_colors", "this is about the colours in a PLY",
-                          "a mesh that is written out has 'color_space'");
-    }
-    object.emission = readEmission(section, object.material, material_name).value_or(-1);
+    const std::optional<std::uint32_t> mesh = meshes_.read(section, material_name, object);
+    object.emission = materials_.readEmission(section, object.material, material_name).value_or(-1);
     if (mesh && !object.shape && scene_.meshes[*mesh].triangles.empty())
         return tellLeftOut(object, section.subject());
     object.mesh = mesh.value_or(0);
-    if (mesh) checkTextures(section, object);
+    if (mesh) meshes_.checkTextures(section, object);
     scene_.objects.push_back(std::move(object));
 }
 

@@ -1,7 +1,7 @@
-// The part of ObjectReader that reads openpbr materials (OpenPBR Surface 1.1): they become crt's own, mixed
-// as the specification says. What crt has not is refused where it would be seen.
+// The part of MaterialReader that reads openpbr materials (OpenPBR Surface 1.1): they become crt's own,
+// mixed as the specification says. What crt has not is refused where it would be seen.
 #include "scene/light_units.h"
-#include "scene/yaml/scene_objects.h"
+#include "scene/yaml/scene_materials.h"
 
 #include <fmt/format.h>
 
@@ -50,8 +50,8 @@ bool isWhite(const Spectrum& s) { return s.min() == 1 && s.max() == 1; }
 }  // namespace
 
 /// What the keys say, and materials made of it.
-struct ObjectReader::OpenPbr {
-    ObjectReader& reader;
+struct MaterialReader::OpenPbr {
+    MaterialReader& reader;
     const SectionReader& section;
     Material like;  ///< What all its parts have in common.
     double base_weight = 1, diffuse_roughness = 0;
@@ -98,19 +98,19 @@ private:
     Material mixed(const char* what, Material first, Material second, const Weight& amount) const;
 };
 
-void ObjectReader::OpenPbr::number(const char* key, Weight& into) const {
+void MaterialReader::OpenPbr::number(const char* key, Weight& into) const {
     if (TextureReader::isTexture(section, key))
         into.texture = reader.textures_.read(section, key, TexelKind::Numbers).value_or(kNoTexture);
     else
         section.read(key, into.value);
 }
 
-void ObjectReader::OpenPbr::color(const char* key, Spectrum& into) const {
+void MaterialReader::OpenPbr::color(const char* key, Spectrum& into) const {
     if (std::optional<Spectrum> s = reader.spectra_.read(section, key, SpectrumUse::Reflectance))
         into = *std::move(s);
 }
 
-void ObjectReader::OpenPbr::read() {
+void MaterialReader::OpenPbr::read() {
     section.read("base_weight", base_weight);
     if (TextureReader::isTexture(section, "base_color"))
         base_texture =
@@ -151,7 +151,7 @@ void ObjectReader::OpenPbr::read() {
 }
 
 template <class No>
-void ObjectReader::OpenPbr::refuseCoat(const No& no) const {
+void MaterialReader::OpenPbr::refuseCoat(const No& no) const {
     const bool has = coat.mayBeAbove0();
     no(has && isClear(), "coat_weight",
        "light would be bent by the coat and by what lies below, and crt's coats lie on what is opaque",
@@ -170,7 +170,7 @@ void ObjectReader::OpenPbr::refuseCoat(const No& no) const {
 }
 
 /// Each sentence is about what would be seen: keys of a slab that is not there may say anything.
-void ObjectReader::OpenPbr::refuse() const {
+void MaterialReader::OpenPbr::refuse() const {
     const auto no = [&](bool seen, const char* key, const char* why, const char* instead) {
         if (seen) section.error(key, why, instead);
     };
@@ -234,13 +234,13 @@ void ObjectReader::OpenPbr::refuse() const {
        "leave 'geometry_opacity' or 'transmission_color' out");
 }
 
-void ObjectReader::OpenPbr::setColor(Material& part) const {
+void MaterialReader::OpenPbr::setColor(Material& part) const {
     part.reflectance_texture = base_texture;
     part.reflectance = scaled(base_color, base_weight);
 }
 
 /// What is seen through a rough coat is seen through it twice.
-void ObjectReader::OpenPbr::setRoughness(Material& part, bool coated) const {
+void MaterialReader::OpenPbr::setRoughness(Material& part, bool coated) const {
     part.roughness = roughness.value;
     part.roughness_texture = roughness.texture;
     if (coated && coat_roughness > 0)
@@ -249,7 +249,7 @@ void ObjectReader::OpenPbr::setRoughness(Material& part, bool coated) const {
                                                                 coat_roughness)));
 }
 
-void ObjectReader::OpenPbr::setCoat(Material& part, double base_roughness) const {
+void MaterialReader::OpenPbr::setCoat(Material& part, double base_roughness) const {
     Clearcoat& it = part.clearcoat.emplace();
     it.ior = coat_ior;
     it.roughness = coat_roughness;
@@ -260,7 +260,7 @@ void ObjectReader::OpenPbr::setCoat(Material& part, double base_roughness) const
     it.base_roughness = base_roughness;
 }
 
-Material ObjectReader::OpenPbr::metal(bool coated) const {
+Material MaterialReader::OpenPbr::metal(bool coated) const {
     Material part = like;
     part.type = MaterialType::RoughConductor;
     part.by_color = true;
@@ -272,7 +272,7 @@ Material ObjectReader::OpenPbr::metal(bool coated) const {
     return part;
 }
 
-Material ObjectReader::OpenPbr::glossy(bool coated) const {
+Material MaterialReader::OpenPbr::glossy(bool coated) const {
     Material part = like;
     setColor(part);
     part.diffuse_roughness = diffuse_roughness;
@@ -289,7 +289,7 @@ Material ObjectReader::OpenPbr::glossy(bool coated) const {
     return part;
 }
 
-Material ObjectReader::OpenPbr::clear(bool under_film) const {
+Material MaterialReader::OpenPbr::clear(bool under_film) const {
     Material part = like;
     part.type = MaterialType::RoughDielectric;
     part.eta = dispersion_scale > 0 ? dispersed(index(), abbe / dispersion_scale)
@@ -309,7 +309,7 @@ Material ObjectReader::OpenPbr::clear(bool under_film) const {
     return part;
 }
 
-Material ObjectReader::OpenPbr::mixed(const char* what, Material first, Material second,
+Material MaterialReader::OpenPbr::mixed(const char* what, Material first, Material second,
                                       const Weight& amount) const {
     if (!amount.mayBeAbove0()) return first;
     if (!amount.mayBeBelow1()) return second;
@@ -328,7 +328,7 @@ Material ObjectReader::OpenPbr::mixed(const char* what, Material first, Material
     return whole;
 }
 
-Material ObjectReader::OpenPbr::base(bool coated) const {
+Material MaterialReader::OpenPbr::base(bool coated) const {
     Material dielectric = glossy(coated);
     if (isClear()) {
         const Weight film{film_um > 0 ? film_weight : 0};
@@ -339,28 +339,22 @@ Material ObjectReader::OpenPbr::base(bool coated) const {
     return mixed(coated ? "coated metalness" : "metalness", std::move(dielectric), metal(coated), metalness);
 }
 
-Material ObjectReader::OpenPbr::make() {
+Material MaterialReader::OpenPbr::make() {
     if (!coat.mayBeAbove0()) return base(false);
     if (!coat.mayBeBelow1()) return base(true);
     Material bare = base(false);
     return mixed("coat", std::move(bare), base(true), coat);
 }
 
-void ObjectReader::makeRoughDiffuse(Material& material) {
-    if (!(material.diffuse_roughness > 0)) return;
-    material.type = MaterialType::Plastic;
-    material.eta = constantSpectrum(1);
-}
-
 /// The luminance is that of a colour of luminance 1, as white is.
-std::int32_t ObjectReader::OpenPbr::emission() const {
+std::int32_t MaterialReader::OpenPbr::emission() const {
     if (!(emission_luminance > 0) || !(emission_color.max() > 0)) return -1;
     const double factor = emission_luminance / luminanceOfUnitY_cd_m2();
     reader.scene_.emissions.push_back({scaled(emission_color, factor), false});
     return static_cast<std::int32_t>(reader.scene_.emissions.size()) - 1;
 }
 
-void ObjectReader::readOpenPbr(const SectionReader& section, Material& material) {
+void MaterialReader::readOpenPbr(const SectionReader& section, Material& material) {
     OpenPbr it{.reader = *this, .section = section, .like = material};
     it.read();
     it.refuse();

@@ -1,5 +1,5 @@
-/// The part of ObjectReader that reads `parts` of objects, and the emission of surfaces.
-#include "scene/yaml/scene_objects.h"
+/// The part of MeshReader that reads `parts` of objects.
+#include "scene/yaml/scene_meshes.h"
 
 #include "scene/mesh/obj_text.h"
 
@@ -10,24 +10,7 @@
 
 namespace crt {
 
-/// Of a surface with the scene's material `material`, −1 none, that is called `material_name`.
-std::optional<std::int32_t> ObjectReader::readEmission(const SectionReader& section, std::int32_t material,
-                                                       const std::string& material_name) {
-    const std::optional<SectionReader> light =
-        section.section("emission", fmt::format("the emission of {}", section.subject()));
-    if (!light) return std::nullopt;
-    Emission emission;
-    light->read("two_sided", emission.two_sided);
-    if (std::optional<Spectrum> radiance = spectra_.read(*light, "radiance", SpectrumUse::Emission))
-        emission.radiance = *std::move(radiance);
-    if (material >= 0 && scene_.materials[static_cast<std::size_t>(material)].emission >= 0)
-        section.error("emission", fmt::format("material '{}' emits light already", material_name),
-                      "leave 'emission' or the material's 'emission_luminance' out");
-    scene_.emissions.push_back(std::move(emission));
-    return static_cast<std::int32_t>(scene_.emissions.size() - 1);
-}
-
-std::vector<PartUse> ObjectReader::readMeshParts(const SectionReader& object) {
+std::vector<PartUse> MeshReader::readMeshParts(const SectionReader& object) {
     std::vector<PartUse> parts;
     const YamlNode* map = object.map("parts");
     if (map == nullptr) return parts;
@@ -42,8 +25,8 @@ std::vector<PartUse> ObjectReader::readMeshParts(const SectionReader& object) {
         section.readEnum("by", part.by);
         std::string material;
         if (section.read("material", material))
-            part.material = findMaterial(material, section.place("material"), false).value_or(-1);
-        part.emission = readEmission(section, part.material, material).value_or(-1);
+            part.material = materials_.find(material, section.place("material"), false).value_or(-1);
+        part.emission = materials_.readEmission(section, part.material, material).value_or(-1);
         if (!section.has("material") && !section.has("emission"))
             out_.error(entry.place,
                        fmt::format("{} says nothing: give it a 'material' or an 'emission'", subject));
@@ -53,7 +36,7 @@ std::vector<PartUse> ObjectReader::readMeshParts(const SectionReader& object) {
 }
 
 /// Of names that no face has.
-void ObjectReader::tellUnknownParts(const SectionReader& object, const PartFinder& parts) const {
+void MeshReader::tellUnknownParts(const SectionReader& object, const PartFinder& parts) const {
     const std::vector<std::string>& names = parts.names();
     constexpr std::size_t kMostNamed = 12;
     std::vector<std::string> shown;

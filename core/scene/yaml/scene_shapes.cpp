@@ -1,6 +1,6 @@
-/// The part of ObjectReader that reads objects with a shape: spheres, disks and cylinders, which stay what
+/// The part of MeshReader that reads objects with a shape: spheres, disks and cylinders, which stay what
 /// they are, and rectangles and boxes, which become meshes.
-#include "scene/yaml/scene_objects.h"
+#include "scene/yaml/scene_meshes.h"
 
 #include <fmt/format.h>
 
@@ -86,12 +86,12 @@ constexpr std::array<const char*, 5> kShapeKeys{"sphere", "disk", "cylinder", "r
 
 }  // namespace
 
-bool ObjectReader::hasShape(const SectionReader& object) {
+bool MeshReader::hasShape(const SectionReader& object) {
     return std::any_of(kShapeKeys.begin(), kShapeKeys.end(),
                        [&](const char* key) { return object.has(key); });
 }
 
-std::optional<std::uint32_t> ObjectReader::readShape(const SectionReader& section, Object& object) {
+std::optional<std::uint32_t> MeshReader::readShape(const SectionReader& section, Object& object) {
     Mesh mesh;  // empty: the object is a shape
     const std::size_t errors_before = out_.count();
     for (const std::string key : kShapeKeys) {
@@ -104,7 +104,7 @@ std::optional<std::uint32_t> ObjectReader::readShape(const SectionReader& sectio
         if (key == "rectangle" || key == "box") {
             std::vector<double> size;
             if (!own->read("size", size)) continue;
-            triangles_ += 12;
+            room_.triangles += 12;
             mesh = key == "box" ? boxMesh(size) : rectangleMesh(size);
         }
     }

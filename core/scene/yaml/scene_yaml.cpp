@@ -229,10 +229,13 @@ void readScene(const YamlNode& root, Diagnostics& out, SceneFiles& files, GltfFi
     if (const auto section = top.section("sampler", "sampler")) readSampler(*section, scene.sampler);
 
     TextureReader textures(out, files, spectra, gltf, scene);
-    ObjectReader objects(out, files, spectra, textures, gltf, scene);
-    if (model_mesh) objects.offer(std::move(model_mesh));
-    if (const YamlNode* map = top.map("materials")) objects.readMaterials(*map);
-    if (const YamlNode* list = top.list("objects")) objects.readObjects(*list);
+    MaterialReader materials(out, spectra, textures, scene);
+    SceneRoom room{.limit = ExpansionLimit(scene.input_bytes)};
+    MeshReader meshes(out, files, textures, gltf, materials, room, scene);
+    if (model_mesh) meshes.offer(std::move(model_mesh));
+    if (const YamlNode* map = top.map("materials")) materials.read(*map);
+    if (const YamlNode* list = top.list("objects"))
+        ObjectReader(out, materials, meshes, room, scene).read(*list);
     if (const YamlNode* list = top.list("lights")) readLights(*list, out, files, spectra, scene);
     if (const auto section = top.section("environment", "environment"))
         scene.environment = readEnvironment(*section, spectra, files);
@@ -244,7 +247,7 @@ void readScene(const YamlNode& root, Diagnostics& out, SceneFiles& files, GltfFi
 
     spectra.finish();
     scene.whites = spectra.whites();
-    if (!out.failed()) objects.finish();
+    if (!out.failed()) materials.finish();
 }
 
 /// `path` is the file of the scene; empty for text of another origin. `composed` may be null.

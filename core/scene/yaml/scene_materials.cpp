@@ -1,0 +1,202 @@
+#include "scene/yaml/scene_materials.h"
+
+#include <fmt/format.h>
+
+#include <string_view>
+#include <tuple>
+
+namespace crt {
+
+void MaterialReader::read(const YamlNode& map) {
+    for (const YamlEntry& entry : map.entries) readMaterial(entry);
+    resolveParts();
+}
+
+void MaterialReader::readMaterial(const YamlEntry& entry) {
+    NamedMaterial& named = materials_[entry.key];
+    named.place = entry.key_place;
+    names_.push_back(entry.key);
+    if (entry.key == "from_mtl" || entry.key.empty() || looksLikeNumber(entry.key)) {
+        out_.error(entry.key_place,
+                   fmt::format("'{}' cannot name a material: where it is used it would mean something else",
+                               entry.key));
+        return;
+    }
+    const std::optional<SectionReader> section =
+        openVariant(out_, *entry.value, entry.place, "material", fmt::format("material '{}'", entry.key));
+    if (!section) return;
+
+    Material material;
+    material.name = entry.key;
+    material.place = entry.key_place.resolved();
+    const auto take = [&](std::string_view key, SpectrumUse use, Spectrum& into) {
+        if (std::optional<Spectrum> s = spectra_.read(*section, key, use)) into = *std::move(s);
+    };
+    const auto takeReflectance = [&] {
+        if (TextureReader::isTexture(*section, "reflectance"))
+            material.reflectance_texture =
+                textures_.read(*section, "reflectance", TexelKind::Spectra).value_or(kNoTexture);
+        else
+            take("reflectance", SpectrumUse::Reflectance, material.reflectance);
+    };
+    const auto takeNumber = [&](std::string_view key, double& number, TextureIndex& texture) {
+        if (TextureReader::isTexture(*section, key))
+            texture = textures_.read(*section, key, TexelKind::Numbers).value_or(kNoTexture);
+        else
+            section->read(key, number);
+    };
+    const auto takeRoughness = [&] {
+        takeNumber("roughness", material.roughness, material.roughness_texture);
+    };
+    const std::string kind = variantWord(section->schema());
+    for (const auto& [type, word] : kMaterialNames)
+        if (kind == word) material.type = type;
+    for (const auto& [type, word] : kComposedNames)
+        if (kind == word) material.type = type;
+    const bool open_pbr = kind == "openpbr";
+    takeNumber(open_pbr ? "geometry_opacity" : "opacity", material.opacity, material.opacity_texture);
+    if (section->schema().find("normal_map") != nullptr)
+        if (const auto map =
+                section->section("normal_map", fmt::format("the normal map of {}", section->subject()))) {
+            material.normal_texture = textures_.readNormalMap(*map);
+            map->read("strength", material.normal_strength);
+        }
+    const auto add = [&] {
+        named.index = static_cast<std::int32_t>(scene_.materials.size());
+        scene_.materials.push_back(std::move(material));
+    };
+    if (open_pbr) {
+        readOpenPbr(*section, material);
+        add();
+        return;
+    }
+    switch (material.type) {
+        case MaterialType::Diffuse:
+            section->read("roughness", material.diffuse_roughness);
+            takeReflectance();
+            makeRoughDiffuse(material);
+            break;
+        case MaterialType::Mirror: takeReflectance(); break;
+        case MaterialType::RoughConductor: takeRoughness(); [[fallthrough]];
+        case MaterialType::Conductor: {
+            std::string metal;
+            if (section->readWord("metal", metal))
+                std::tie(material.eta, material.k) = metalIndex(metal).value();
+            take("eta", SpectrumUse::Index, material.eta);
+            take("k", SpectrumUse::Index, material.k);
+            break;
+        }
+        case MaterialType::RoughDielectric: takeRoughness(); [[fallthrough]];
+        case MaterialType::Dielectric:
+            material.absorption = spectra_.read(*section, "absorption", SpectrumUse::Absorption);
+            [[fallthrough]];
+        case MaterialType::ThinDielectric: take("ior", SpectrumUse::Index, material.eta); break;
+        case MaterialType::Mix:
+            takeNumber("amount", material.amount, material.amount_texture);
+            [[fallthrough]];
+        case MaterialType::TwoSided: readParts(*section); break;
+        case MaterialType::Plastic: {
+            double ior = 1.5;
+            section->read("ior", ior);
+            section->read("roughness", material.roughness);
+            material.eta = constantSpectrum(ior);
+            takeReflectance();
+            break;
+        }
+    }
+    if (material.absorption && !material.isOpaque())
+        section->error("opacity",
+                       "a body that absorbs is closed: where its surface is not there, light would enter it "
+                       "unseen",
+                       "leave 'opacity' or 'absorption' out");
+    if (section->schema().find("thin_film") != nullptr) readThinFilm(*section, material);
+    if (section->schema().find("roughness_anisotropy") != nullptr) readAnisotropy(*section, material);
+    add();
+}
+
+void MaterialReader::makeRoughDiffuse(Material& material) {
+    if (!(material.diffuse_roughness > 0)) return;
+    material.type = MaterialType::Plastic;
+    material.eta = constantSpectrum(1);
+}
+
+void MaterialReader::readThinFilm(const SectionReader& section, Material& material) {
+    if (!section.has("thin_film")) return;
+    const std::optional<SectionReader> film =
+        section.section("thin_film", fmt::format("the film of material '{}'", material.name));
+    if (!film) return;
+    film->read("thickness_nm", material.film_thickness_nm);
+    if (std::optional<Spectrum> index = spectra_.read(*film, "ior", SpectrumUse::Index))
+        material.film_index = *std::move(index);
+    if (!TextureReader::isTexture(*film, "relative_thickness")) {
+        double relative = 1;
+        film->read("relative_thickness", relative);
+        material.film_thickness_nm *= relative;
+    } else if (material.type == MaterialType::RoughDielectric) {
+        film->error("relative_thickness",
+                    "a film on a rough_dielectric is equally thick everywhere: what its microfacets lose is "
+                    "tabulated for one thickness",
+                    "leave 'relative_thickness' out, give a number, or take a dielectric");
+    } else {
+        material.film_texture =
+            textures_.read(*film, "relative_thickness", TexelKind::Numbers).value_or(kNoTexture);
+    }
+}
+
+void MaterialReader::readAnisotropy(const SectionReader& section, Material& material) const {
+    section.read("roughness_anisotropy", material.anisotropy);
+    section.read("anisotropy_rotation_deg", material.anisotropy_rotation_deg);
+    if (!(material.anisotropy > 0)) return;
+    if (material.roughness_texture != kNoTexture)
+        section.error("roughness_anisotropy",
+                      "an anisotropic surface is equally rough everywhere: what its microfacets lose is "
+                      "tabulated for one roughness",
+                      "give 'roughness' a number, or leave 'roughness_anisotropy' out");
+    if (material.type == MaterialType::RoughDielectric && material.film_thickness_nm > 0)
+        section.error("roughness_anisotropy",
+                      "a rough_dielectric under a film is as rough in every direction: what its microfacets "
+                      "lose is tabulated by wavelength already",
+                      "leave 'thin_film' or 'roughness_anisotropy' out");
+}
+
+std::optional<std::int32_t> MaterialReader::find(const std::string& name, const YamlPlace& place,
+                                                 bool from_mtl_possible) {
+    const auto found = materials_.find(name);
+    if (found != materials_.end()) {
+        found->second.used = true;
+        if (found->second.index < 0) return std::nullopt;
+        return found->second.index;
+    }
+    std::vector<std::string> known =
+        out_.worthSuggesting(names_.size()) ? names_ : std::vector<std::string>();
+    if (from_mtl_possible) known.push_back("from_mtl");
+    out_.error(place, fmt::format("there is no material '{}'", name),
+               out_.worthSuggesting(known.size()) ? didYouMean(name, known) : std::string());
+    return std::nullopt;
+}
+
+std::optional<std::int32_t> MaterialReader::readEmission(const SectionReader& section, std::int32_t material,
+                                                       const std::string& material_name) {
+    const std::optional<SectionReader> light =
+        section.section("emission", fmt::format("the emission of {}", section.subject()));
+    if (!light) return std::nullopt;
+    Emission emission;
+    light->read("two_sided", emission.two_sided);
+    if (std::optional<Spectrum> radiance = spectra_.read(*light, "radiance", SpectrumUse::Emission))
+        emission.radiance = *std::move(radiance);
+    if (material >= 0 && scene_.materials[static_cast<std::size_t>(material)].emission >= 0)
+        section.error("emission", fmt::format("material '{}' emits light already", material_name),
+                      "leave 'emission' or the material's 'emission_luminance' out");
+    scene_.emissions.push_back(std::move(emission));
+    return static_cast<std::int32_t>(scene_.emissions.size() - 1);
+}
+
+void MaterialReader::finish() const {
+    UnusedNames unused("material", "materials");
+    for (const std::string& name : names_)
+        if (const NamedMaterial& material = materials_.at(name); !material.used)
+            unused.add(name, material.place);
+    unused.finish();
+}
+
+}  // namespace crt
