@@ -51,12 +51,12 @@ class Sections(unittest.TestCase):
             page = pathlib.Path(folder) / "page.md"
             page.write_text("# A\n\n<!-- results: a -->\nold\n<!-- /results: a -->\n\n"
                             "<!-- results: b -->\nother\n<!-- /results: b -->\n")
-            lines = section.section("Claim", section.source("x", "0123456", "2026-01-01", "A machine"), "Text.",
-                                    ["a", "b"], [[1, 2]])
+            source = section.source("x", "0123456", "2026-01-01", "A machine")
+            lines = section.section("Claim", source, "Text.", ["a", "b"], [[1, 2]])
             self.assertEqual(section.page_of("a", pathlib.Path(folder)), page)
             section.replace(page, "a", lines)
-            self.assertEqual(page.read_text(), "# A\n\n<!-- results: a -->\n## Claim\n\n`x`, commit `0123456`, "
-                             "2026-01-01. A machine.\n\nText.\n\n| a | b |\n|---|---|\n| 1 | 2 |\n"
+            self.assertEqual(page.read_text(), "# A\n\n<!-- results: a -->\n## Claim\n\n`x`, commit "
+                             "`0123456`, 2026-01-01. A machine.\n\nText.\n\n| a | b |\n|---|---|\n| 1 | 2 |\n"
                              "<!-- /results: a -->\n\n<!-- results: b -->\nother\n<!-- /results: b -->\n")
             with self.assertRaisesRegex(ValueError, "no section"):
                 section.replace(page, "c", lines)
