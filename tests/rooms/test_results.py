@@ -56,7 +56,8 @@ class Sections(unittest.TestCase):
             self.assertEqual(section.page_of("a", pathlib.Path(folder)), page)
             section.replace(page, "a", lines)
             self.assertEqual(page.read_text(), "# A\n\n<!-- results: a -->\n## Claim\n\n`x`, commit "
-                             "`0123456`, 2026-01-01. A machine.\n\nText.\n\n| a | b |\n|---|---|\n| 1 | 2 |\n"
+                             "`0123456`, 2026-01-01. A machine.\n\nText.\n\n"
+                             "| a | b |\n|---|---|\n| 1 | 2 |\n"
                              "<!-- /results: a -->\n\n<!-- results: b -->\nother\n<!-- /results: b -->\n")
             with self.assertRaisesRegex(ValueError, "no section"):
                 section.replace(page, "c", lines)
