@@ -177,7 +177,7 @@ TEST_CASE("mix: what a scene may not say", "[composition][yaml]") {
 
     const std::string cyclic = refusal("  m: {type: mix, materials: [a, z]}\n"
                                        "  z: {type: two_sided, front: c, back: m}\n");
-    CHECK(says(cyclic, "scene.yaml:9:40: error: material 'm' contains itself: 'm' of 'z' of 'm'"));
+    CHECK(says(cyclic, "scene.yaml:9:40: error: material 'm' is made of itself: 'm' of 'z' of 'm'"));
     CHECK(says(refusal("  m: {type: mix, materials: [a, m]}\n"), "'m' of 'm'"));
     const std::string unknown = refusal("  m: {type: mix, materials: [a, glas]}\n");
     CHECK(says(unknown, "scene.yaml:8:33: error: there is no material 'glas'"));

@@ -121,7 +121,7 @@ TEST_CASE("long lines are cut around the place", "[scene_yaml][refused]") {
     for (int i = 0; i < 200; ++i) table += std::to_string(360 + i) + ", ";
     const std::string message = refused(table + "nan], value: [1]}}}\n");
     CHECK_THAT(message,
-               Contains("value 201 of 'nm', found 'nan': a scene cannot contain NaN or infinity"));
+               Contains("value 201 of 'nm', found 'nan': NaN and infinity have no place in a scene"));
     CHECK_THAT(message, Contains(" | …") && Contains("^~~"));
     CHECK(message.size() < 500);
 }
@@ -213,7 +213,7 @@ TEST_CASE("spectra that cannot be", "[scene_yaml][refused]") {
     CHECK_THAT(refusedReflectance("{table: {nm: [400, 550, 700], value: [0.1, 1.25, 0.5]}, outside: clamp}"),
                Contains("'reflectance' of material 'm' reaches 1.25 at 550 nm; it must be 0 to 1"));
     CHECK_THAT(refusedReflectance("-0.1"), Contains("is -0.1; it must be 0 to 1"));
-    CHECK_THAT(refusedReflectance(".nan"), Contains("a scene cannot contain NaN or infinity"));
+    CHECK_THAT(refusedReflectance(".nan"), Contains("NaN and infinity have no place in a scene"));
     CHECK_THAT(refusedReflectance("{rgb: [1.2, 0, 0]}"),
                Contains("a component of this colour is 1.2; a reflectance must be 0 to 1"));
     CHECK_THAT(refusedReflectance("{rgb: [0.2, 0, 0], spcae: srgb}"), Contains("did you mean 'space'?"));
@@ -305,7 +305,7 @@ TEST_CASE("spectra that cannot be", "[scene_yaml][refused]") {
           std::tuple{"coat_weight: 1, emission_luminance: 1", "the coat would take",
                      "leave 'coat_weight'"},
           std::tuple{"coat_weight: 1, specular_ior: 17", "an index of 1 to 10", "of at least 1"},
-          std::tuple{"fuzz_weight: 1, emission_luminance: 1", "absorb some of the emitted light",
+          std::tuple{"fuzz_weight: 1, emission_luminance: 1", "take some of the emitted light",
                      "leave 'fuzz_weight'"},
           std::tuple{"geometry_thin_walled: true", "does not support thin-walled", "use a thin_dielectric"},
           std::tuple{"base_metalness: 1, specular_weight: 2", "more light than it receives", "1 or less"},

@@ -26,7 +26,7 @@ std::string notDecimal(const std::string& text) {
     if (!body.empty() && (body.front() == '+' || body.front() == '-')) body.remove_prefix(1);
     const std::string lower = lowerCase(body);
     if (lower == "nan" || lower == ".nan" || lower == "inf" || lower == ".inf" || lower == "infinity")
-        return "a scene cannot contain NaN or infinity";
+        return "NaN and infinity have no place in a scene";
     if (lower.starts_with('+') || lower.starts_with('-')) return "it is not a number";
     if (lower.starts_with("0x") || lower.starts_with("0o") || lower.starts_with("0b"))
         return "write it in decimal";

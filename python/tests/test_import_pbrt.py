@@ -301,7 +301,7 @@ def test_what_crt_lacks_is_listed_once_with_its_count(tmp_path):
     ('Shape "sphere" "float radius" "big"', 1, 16, "takes numbers"),
     ('Shape "trianglemesh" "point3 P" [0 0 0 1]', 1, 22, "3 numbers each"),
     ('Shape "trianglemesh" "point3 P" [0 0 0 1 0 0 0 1 0] "integer indices" [0 1 3]', 1, 53,
-     "none of the 3"),
+     "not among the 3"),
     ('NamedMaterial "a"\nShape "sphere"', 1, 1, "no material 'a'"),
     ('Shape "plymesh" "string filename" "no.ply"', 1, 17, "does not exist"),
     ('Include "scene.pbrt"', 1, 1, "includes itself"),
@@ -312,7 +312,7 @@ def test_what_crt_lacks_is_listed_once_with_its_count(tmp_path):
     ('Film "rgb" "integer xresolution" 1000000000', 1, 1, "65535"),
     ('Material "diffuse" "texture reflectance" "t"\nShape "sphere"', 1, 20, "no texture 't'"),
     ('Texture "t" "float" "scale" "texture tex" "t"\nShape "sphere" "texture alpha" "t"', 1, 29,
-     "of itself"),
+     "contains itself"),
     ('Shape "sphere" "float radius" -1', 1, 1, "above 0"),
 ])
 def test_errors_have_their_place(tmp_path, text, line, column, phrase):

@@ -103,7 +103,7 @@ def gltf_cases(case):
         ("buffers/0/uri", "file:///etc/passwd", "crt does not load"),
         ("buffers/0/uri", "https://example.org/a.bin", "crt does not load"),
         ("buffers/0/uri", "none.bin", "none.bin"),
-        ("buffers/0/uri", "data:application/octet-stream;base64,****", "base 64"),
+        ("buffers/0/uri", "data:application/octet-stream;base64,****", "base64"),
         ("scenes/0/nodes", [5], "a.gltf"),
         ("scene", 8, "a.gltf"),
         ("nodes/0/mesh", 5, "there is no mesh 5"),

@@ -111,7 +111,7 @@ void MaterialReader::checkParts(const std::vector<std::int32_t>& way) {
             std::vector<std::string> names;
             for (auto step = further.begin() + (again - way.begin()); step != further.end(); ++step)
                 names.push_back("'" + at(*step).name + "'");
-            out_.error(place, fmt::format("material '{}' contains itself: {}", at(part).name,
+            out_.error(place, fmt::format("material '{}' is made of itself: {}", at(part).name,
                                           fmt::join(names, " of ")));
             return;
         }

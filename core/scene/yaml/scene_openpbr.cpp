@@ -154,9 +154,9 @@ template <class No>
 void MaterialReader::OpenPbr::refuseCoat(const No& no) const {
     const bool has = coat.mayBeAbove0();
     no(has && isClear(), "coat_weight",
-       "crt supports coats on opaque materials only",
+       "crt does not support a coat on a clear base: crt's coats lie on what is opaque",
        "leave 'coat_weight' or 'transmission_weight' out");
-    no(has && (coat_ior < 1 || coat_ior > 10), "coat_ior", "the index of a coat must be 1 to 10",
+    no(has && (coat_ior < 1 || coat_ior > 10), "coat_ior", "a coat needs an index of 1 to 10",
        "give 'coat_ior' from 1 to 10");
     no(has && coat_roughness > 0 && coat_anisotropy > 0, "coat_roughness_anisotropy",
        "a coat must be isotropic, because its reflection is tabulated",
@@ -165,7 +165,7 @@ void MaterialReader::OpenPbr::refuseCoat(const No& no) const {
        "a metal under a rough coat needs a uniform roughness",
        "give 'specular_roughness' a number, or 'coat_roughness' 0");
     no(has && emission_luminance > 0, "emission_luminance",
-       "the coat would absorb some of the emitted light, and crt supports emission only from the top layer",
+       "the coat would take some of the emitted light, and crt supports emission only from the top layer",
        "leave 'coat_weight' or 'emission_luminance' out");
 }
 
@@ -176,10 +176,11 @@ void MaterialReader::OpenPbr::refuse() const {
     };
     double subsurface = 0;
     if (section.read("subsurface_weight", subsurface))
-        no(subsurface > 0, "subsurface_weight", "crt does not support subsurface scattering",
+        no(subsurface > 0, "subsurface_weight", "crt does not support subsurface scattering, where light "
+                                                "wanders below a surface",
            "remove 'subsurface_weight', which makes the base diffuse");
     no(emission_luminance > 0 && like.fuzz > 0, "emission_luminance",
-       "the fuzz would absorb some of the emitted light, and crt supports emission only from the top layer",
+       "the fuzz would take some of the emitted light, and crt supports emission only from the top layer",
        "leave 'fuzz_weight' or 'emission_luminance' out");
     refuseCoat(no);
     bool thin_walled = false;

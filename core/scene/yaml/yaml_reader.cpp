@@ -130,7 +130,7 @@ public:
         const YamlPlace place = placeOf(mark);
         const auto found = anchors_.find(anchor);
         const bool cyclic = found != anchors_.end() && open_anchors_.contains(anchor);
-        if (cyclic) out_.error(place, "this alias is inside its own value: a cycle is not possible");
+        if (cyclic) out_.error(place, "this alias is inside its own value: a cycle has no end");
         if (found == anchors_.end() || cyclic) {
             auto node = make(YamlKind::Null, place);
             node->reported = cyclic;
