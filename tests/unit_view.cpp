@@ -15,11 +15,9 @@
 #include "view/page_changes.h"
 #include "view/primitive_names.h"
 #include "view/scene_source.h"
-#include "view/tev_sender.h"
 
 #include <chrono>
 #include <cmath>
-#include <cstring>
 #include <filesystem>
 #include <numbers>
 #include <string>
@@ -51,16 +49,6 @@ std::array<double, 2> shownAt(const crt::Camera& camera, const Vec3d& point) {
     const double depth = crt::dot(to, view);
     return {0.5 + crt::dot(to, right) / depth / camera.tan_half_width / 2,
             0.5 - crt::dot(to, up) / depth / camera.tan_half_height / 2};
-}
-
-std::string textOf(const std::vector<std::uint8_t>& bytes) { return {bytes.begin(), bytes.end()}; }
-
-template <class T>
-T numberAt(const std::vector<std::uint8_t>& bytes, std::size_t at) {
-    T value{};
-    REQUIRE(at + sizeof value <= bytes.size());
-    std::memcpy(&value, bytes.data() + at, sizeof value);
-    return value;
 }
 
 }  // namespace
@@ -364,33 +352,6 @@ TEST_CASE("the camera's YAML is read back as that camera", "[view]") {
     CHECK(read == pose);
     for (const char* key : {"focus", "fov"})
         CHECK(crt::cameraYaml(pose, false, false).find(key) == std::string::npos);
-}
-
-TEST_CASE("packets for tev have its layout", "[view]") {
-    const auto create = crt::tevCreateImage("a.yaml", 640, 360);
-    CHECK(numberAt<std::uint32_t>(create, 0) == create.size());
-    CHECK(textOf(create).substr(4) ==
-          std::string("\x04\0a.yaml\0\x80\x02\0\0\x68\x01\0\0\x03\0\0\0R\0G\0B\0", 27));
-    const std::vector<float> rgb{1, 2, 3, 4, 5, 6};
-    const auto update = crt::tevUpdateImage("a", 2, 1, rgb);
-    CHECK(numberAt<std::uint32_t>(update, 0) == update.size());
-    CHECK(textOf(update).substr(4, 14) == std::string("\x06\0a\0\x03\0\0\0R\0G\0B\0", 14));
-    std::size_t at = 18;
-    for (const std::int32_t expected : {0, 0, 2, 1}) {
-        CHECK(numberAt<std::int32_t>(update, at) == expected);
-        at += 4;
-    }
-    for (const std::int64_t expected : {0, 1, 2, 3, 3, 3}) {
-        CHECK(numberAt<std::int64_t>(update, at) == expected);
-        at += 8;
-    }
-    REQUIRE(update.size() == at + rgb.size() * sizeof(float));
-    CHECK(std::memcmp(update.data() + at, rgb.data(), rgb.size() * sizeof(float)) == 0);
-
-    CHECK(crt::parseTevAddress("somewhere").port == "14158");
-    CHECK(crt::parseTevAddress("there:99").host == "there");
-    for (const char* text : {"", ":1", "there:", "there:0", "there:65536", "there:x"})
-        CHECK_THROWS_AS(crt::parseTevAddress(text), crt::Error);
 }
 
 TEST_CASE("who waits at the board is woken by news and by its end", "[view]") {

@@ -46,8 +46,7 @@ constexpr const char* kViewNotes =
     "\nExamples:\n"
     "  crt view scene.yaml                           opens a browser, or prints the address\n"
     "  crt view scene.yaml --set film.resolution=[640,360] --spp 4096\n"
-    "  crt view scene.yaml --port 8080 --no-open     at a port that stays the same\n"
-    "  crt view scene.yaml --tev localhost:14158     in the viewer tev as well\n";
+    "  crt view scene.yaml --port 8080 --no-open     at a port that stays the same\n";
 
 OptionGroup what(ViewArguments& to) {
     OptionGroup group{"What is shown"};
@@ -77,11 +76,7 @@ OptionGroup where(ViewArguments& to) {
              {.names = "--no-open",
               .placeholder = {},
               .help = "open no browser",
-              .read = [&to](const std::string&) { to.serve.open_browser = false; }},
-             {.names = "--tev",
-              .placeholder = "HOST:PORT",
-              .help = "send the image to the viewer tev, too",
-              .read = [&to](const std::string& text) { to.view.tev = parseTevAddress(text); }}}};
+              .read = [&to](const std::string&) { to.serve.open_browser = false; }}}};
 }
 
 }  // namespace

@@ -66,7 +66,6 @@ struct Status {
     std::vector<std::string> whites;  ///< That can be chosen.
     std::string plane;
     std::vector<ErrorPoint> errors;  ///< Of this render, in order.
-    std::string tev;                 ///< What became of it; empty: it is not asked for.
 };
 
 class Board {

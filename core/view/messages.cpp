@@ -168,8 +168,7 @@ std::string sightJson(const Board::Sight& sight) {
               {"white", s.white},
               {"whites", s.whites},
               {"plane", s.plane},
-              {"errors", errorsJson(s.errors)},
-              {"tev", s.tev}};
+              {"errors", errorsJson(s.errors)}};
     if (const Picture* const p = sight.picture.get())
         json["picture"] = {{"number", p->number},   {"width", p->width},
                            {"height", p->height},   {"samples", p->samples},

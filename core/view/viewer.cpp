@@ -23,12 +23,6 @@ RenderWishes wishesOf(const ViewOptions& options) {
     return wishes;
 }
 
-std::unique_ptr<TevSender> tevOf(const ViewOptions& options, Board& board) {
-    if (!options.tev) return nullptr;
-    const std::string name = std::filesystem::path(options.scene.file).filename().string();
-    return std::make_unique<TevSender>(*options.tev, name, board);
-}
-
 /// What each film holds: which surface a pixel shows, and how far it is where a lens can be focused on it.
 std::uint32_t basicAovs(const Scene& scene) {
     return kAovPrimitive | (scene.camera.aperture_radius > 0 ? kAovDepth : 0u);
@@ -43,13 +37,9 @@ Viewer::Viewer(const ViewOptions& options)
           [this](LogLevel level, std::string_view message) { hear(level, message); }, LogLevel::Debug,
           [this](const std::string& what) { board_.update([&](Status& status) { status.stage = what; }); }),
       scope_(listener_),
-      tev_(tevOf(options, board_)),
       developer_(board_, options.integrator.threads),
       renderer_(wishesOf(options), board_,
-                [this](Snapshot snapshot) {
-                    if (tev_) tev_->take(snapshot);
-                    developer_.take(std::move(snapshot));
-                }),
+                [this](Snapshot snapshot) { developer_.take(std::move(snapshot)); }),
       source_(options.scene, board_, [this](auto scene) { takeScene(std::move(scene)); }) {
     board_.update([&, program = randomToken()](Status& status) {
         status.file = options.scene.file;

@@ -10,7 +10,6 @@
 #include "view/renderer.h"
 #include "view/reports.h"
 #include "view/scene_source.h"
-#include "view/tev_sender.h"
 
 #include <array>
 #include <cstdint>
@@ -27,7 +26,6 @@ struct ViewOptions {
     std::string backend = "auto";
     IntegratorOptions integrator;
     std::uint64_t samples = 0;  ///< Per pixel; 0: the scene's.
-    std::optional<TevAddress> tev;
 };
 
 struct ChangeRequest {
@@ -91,7 +89,6 @@ private:
     std::string devices_;
 
     // In the order of the data; each is gone before those that it hands on to.
-    const std::unique_ptr<TevSender> tev_;  ///< Null: nobody asked for it.
     Developer developer_;
     Renderer renderer_;
     SceneSource source_;

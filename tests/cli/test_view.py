@@ -7,7 +7,6 @@ in. What a browser makes of it is asked by tests/view/test_page.py.
 
 import signal
 import socket
-import struct
 import threading
 import time
 import urllib.error
@@ -322,7 +321,7 @@ class Access(CliTest):
 
     def test_what_is_no_option_is_refused(self):
         for arguments, words in ((["--prot", "1"], "--port"), (["--port", "65536"], "65535"),
-                                 (["--token", "short"], "16"), (["--tev", "here:"], "HOST:PORT")):
+                                 (["--token", "short"], "16")):
             run = self.crt("view", "scene.yaml", *arguments, expect=2)
             self.assert_one_error(run, words)
         self.assert_one_error(self.crt("view", "-", expect=2), "file")
@@ -359,41 +358,6 @@ class End(CliTest):
         view = View(self, "-b", "fake", CRT_FAKE_SCENE_SECONDS="20")
         time.sleep(0.3)
         self.end(view, signal.SIGINT)
-
-
-class Tev(CliTest):
-    def receive(self, listener, packets):
-        connection, _ = listener.accept()
-        with connection, connection.makefile("rb") as stream:
-            while length := stream.read(4):
-                packets.append(stream.read(struct.unpack("<I", length)[0] - 4))
-
-    def test_the_image_reaches_tev(self):
-        packets = []
-        with socket.create_server(("127.0.0.1", 0)) as listener:
-            receiver = threading.Thread(target=self.receive, args=(listener, packets))
-            receiver.start()
-            view = View(self, "-b", "fake", "--spp", "4", "--tev", f"127.0.0.1:{listener.getsockname()[1]}")
-            view.wait_until_done()
-            view.wait(lambda s: "shows 'scene.yaml'" in s["tev"])
-            time.sleep(0.5)
-            view.process.terminate()
-            receiver.join(20)
-        self.assertEqual(packets[0], b"\x04\0scene.yaml\0" + struct.pack("<3i", 24, 16, 3) + b"R\0G\0B\0")
-        values = packets[-1][-4 * 24 * 16 * 3:]
-        self.crt("render", "scene.yaml", "-b", "fake", "--spp", "4", "-o", "a.pfm")
-        width, height, expected = harness.read_pfm(self.path("a.pfm"))
-        sent = struct.unpack(f"<{width * height * 3}f", values)
-        # PFM has the bottom row first.
-        rows = [expected[i:i + 3 * width] for i in range(0, len(expected), 3 * width)]
-        self.assertEqual(sent, tuple(v for row in reversed(rows) for v in row))
-
-    def test_a_tev_that_is_not_there_is_told(self):
-        with socket.socket() as nobody:
-            nobody.bind(("127.0.0.1", 0))
-            view = View(self, "-b", "fake", "--tev", f"127.0.0.1:{nobody.getsockname()[1]}")
-            status, _ = view.wait(lambda s: s["tev"])
-        self.assertIn("is not reached", status["tev"])
 
 
 def is_open(connection):

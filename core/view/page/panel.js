@@ -92,7 +92,6 @@ function showStatus(status) {
   setText("yaml", status.camera_yaml.trimEnd());
   setText("lens", status.has_lens ? "Ctrl and a click focus the lens." : "");
   by("reset").disabled = !status.camera_moved;
-  setText("tev", status.tev);
   drawChart(status.errors);
   showNotes();
 }
