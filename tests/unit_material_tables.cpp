@@ -1,5 +1,6 @@
 // The tables that are made of materials before rendering: each once, the same in any company, and not more
 // than a scene may ask for.
+#include "base/memo.h"
 #include "catch.h"
 #include "compile/compile.h"
 #include "compile/compensation.h"
@@ -94,6 +95,8 @@ TEST_CASE("a table does not depend on what else is made", "[compile][materials]"
     for (const Material& m : copies) twice.push_back(&m);
     const MaterialTables together = materialTablesOf(twice);
     for (const Material* m : twice) {
+        forgetLossTables();  // Otherwise the tables would be compared with themselves.
+        forgetCoats();
         const MaterialTables alone = materialTablesOf({m});
         CAPTURE(static_cast<int>(m->type), m->roughness);
         const Compensations &own = alone.compensations, &all = together.compensations;
@@ -109,6 +112,60 @@ TEST_CASE("a table does not depend on what else is made", "[compile][materials]"
     }
     // All of one kind share a table, those behind a film have one each.
     CHECK(together.compensations.tables.size() == 5);
+}
+
+TEST_CASE("a memo makes what it does not hold, once, and holds no more than it may",
+          "[compile][materials]") {
+    Memo<int, int> memo(3);
+    std::vector<int> asked;
+    const auto square = [&](const std::vector<int>& keys) {
+        std::vector<int> squares;
+        for (const int key : keys) {
+            asked.push_back(key);
+            squares.push_back(key * key);
+        }
+        return squares;
+    };
+    CHECK(memo.of({2, 3}, square) == std::vector{4, 9});
+    CHECK(memo.of({3, 4, 2}, square) == std::vector{9, 16, 4});
+    CHECK(asked == std::vector{2, 3, 4});
+    CHECK(memo.of({}, square).empty());
+    // A fourth is one too many: the three go.
+    CHECK(memo.of({5}, square) == std::vector{25});
+    CHECK(memo.of({5, 2}, square) == std::vector{25, 4});
+    CHECK(asked == std::vector{2, 3, 4, 5, 2});
+    memo.forget();
+    CHECK(memo.of({5}, square) == std::vector{25});
+    CHECK(asked.size() == 6);
+    // More at once than it may hold are still all there.
+    CHECK(memo.of({1, 2, 3, 4, 6, 7}, square) == std::vector{1, 4, 9, 16, 36, 49});
+}
+
+TEST_CASE("tables that are kept are those that would be made", "[compile][materials]") {
+    const std::vector<Material> materials = oneOfEach();
+    // Differs from another one in a single input.
+    std::vector<Material> others = materials;
+    others[1].roughness = 0.41;
+    others[5].film_thickness_nm = 101;
+    others[6].clearcoat->ior = 1.61;
+    forgetLossTables();
+    forgetCoats();
+    const MaterialTables first = materialTablesOf(addressesOf(materials));
+    const MaterialTables beside = materialTablesOf(addressesOf(others));
+    forgetLossTables();
+    forgetCoats();
+    const MaterialTables made = materialTablesOf(addressesOf(others));
+    const auto rowsOf = [](const MaterialTables& tables, std::size_t i) {
+        return tables.compensations.tables.at(i).rows;
+    };
+    REQUIRE(made.compensations.tables.size() == beside.compensations.tables.size());
+    std::size_t differing = 0;
+    for (std::size_t i = 0; i < made.compensations.tables.size(); ++i) {
+        CHECK(rowsOf(made, i) == rowsOf(beside, i));
+        differing += rowsOf(first, i) != rowsOf(made, i);
+    }
+    CHECK(differing == 2);
+    for (const auto& [key, coat] : made.coats) CHECK(beside.coats.at(key).albedo == coat.albedo);
 }
 
 TEST_CASE("tables that take too long are refused with the place and what allows them",

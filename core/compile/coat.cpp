@@ -1,5 +1,6 @@
 #include "compile/coat.h"
 
+#include "base/memo.h"
 #include "base/parallel.h"
 #include "compile/reflectance.h"
 #include "compile/visible_normals.h"
@@ -67,7 +68,29 @@ void forCoats(const std::vector<const Material*>& materials, const Add& add) {
     }
 }
 
+/// The albedos of coats that are not smooth.
+std::vector<SpectrumValues::Array> makeAlbedos(const std::vector<CoatKey>& keys) {
+    std::vector<SpectrumValues::Array> albedos(keys.size());
+    parallelFor(keys.size() * kSpectrumSize, 16, [&](std::size_t first, std::size_t end) {
+        for (std::size_t n = first; n < end; ++n) {
+            const CoatKey& key = keys[n / kSpectrumSize];
+            const std::size_t i = n % kSpectrumSize;
+            albedos[n / kSpectrumSize][i] =
+                coatAlbedo(std::max(static_cast<double>(i) / kCoatCells, 1e-4), key.first, alphaOf(key));
+        }
+    });
+    return albedos;
+}
+
+/// As with the tables of losses (loss_table.h).
+Memo<CoatKey, SpectrumValues::Array>& keptAlbedos() {
+    static Memo<CoatKey, SpectrumValues::Array> kept(128);
+    return kept;
+}
+
 }  // namespace
+
+void forgetCoats() { keptAlbedos().forget(); }
 
 void countCoats(const std::vector<const Material*>& materials, TableWork& work) {
     // Fresnel's equations, with two roots for each direction, are dearer than shadowing.
@@ -81,21 +104,14 @@ void countCoats(const std::vector<const Material*>& materials, TableWork& work) 
 Coats coatsOf(const std::vector<const Material*>& materials) {
     Coats coats;
     forCoats(materials, [&](const CoatKey& key, const Material&) { coats.try_emplace(key); });
-    std::vector<std::pair<const CoatKey, Coat>*> all, rough;
+    std::vector<std::pair<const CoatKey, Coat>*> all;
+    std::vector<CoatKey> rough;
     for (auto& entry : coats) {
         all.push_back(&entry);
-        if (!isSmooth(entry.first)) rough.push_back(&entry);
+        if (!isSmooth(entry.first)) rough.push_back(entry.first);
     }
-    std::vector<SpectrumValues::Array> albedos(rough.size());
-    parallelFor(rough.size() * kSpectrumSize, 16, [&](std::size_t first, std::size_t end) {
-        for (std::size_t n = first; n < end; ++n) {
-            const CoatKey& key = rough[n / kSpectrumSize]->first;
-            const std::size_t i = n % kSpectrumSize;
-            albedos[n / kSpectrumSize][i] =
-                coatAlbedo(std::max(static_cast<double>(i) / kCoatCells, 1e-4), key.first, alphaOf(key));
-        }
-    });
-    for (std::size_t i = 0; i < rough.size(); ++i) rough[i]->second.albedo.values = albedos[i];
+    const std::vector<SpectrumValues::Array> albedos = keptAlbedos().of(rough, makeAlbedos);
+    for (std::size_t i = 0; i < rough.size(); ++i) coats.at(rough[i]).albedo.values = albedos[i];
     parallelFor(all.size(), 1, [&](std::size_t first, std::size_t end) {
         for (std::size_t i = first; i < end; ++i) finish(all[i]->first, all[i]->second);
     });

@@ -35,6 +35,9 @@ inline bool hasClearcoat(const Material& material) {
 void countCoats(const std::vector<const Material*>& materials, TableWork& work);
 Coats coatsOf(const std::vector<const Material*>& materials);
 
+/// Drops the coats that the process keeps, for tests that compare coats made twice.
+void forgetCoats();
+
 /// E(θ): the share that GGX microfacets of width `alpha` on an interface of relative index `eta` mirror
 /// once of light from one direction, Smith's shadowing correlated by height (Heitz 2014). Midpoint rule over
 /// the visible normals by spherical caps (Dupuy and Benyoub 2023); error below 3e-4 (tests/unit_bsdf.cpp).

@@ -198,7 +198,7 @@ Compensations compensationsOf(const std::vector<const Material*>& materials) {
         }
         all.table_of[material] = found->second;
     }
-    const std::vector<LossTable> made = makeLossTables(plans);
+    const std::vector<LossTable> made = lossTablesOf(plans);
     for (const std::size_t plan : plan_of) all.tables.push_back(made[plan]);
     return all;
 }

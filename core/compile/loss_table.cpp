@@ -1,5 +1,6 @@
 #include "compile/loss_table.h"
 
+#include "base/memo.h"
 #include "base/parallel.h"
 #include "compile/reflectance.h"
 #include "compile/visible_normals.h"
@@ -217,8 +218,6 @@ void finish(const Draft& plan, std::vector<float>& rows) {
                               plan.key.narrowing);
 }
 
-}  // namespace
-
 std::vector<LossTable> makeLossTables(const std::vector<LossPlan>& wanted) {
     struct Work {
         const Row* row;
@@ -246,6 +245,20 @@ std::vector<LossTable> makeLossTables(const std::vector<LossPlan>& wanted) {
     });
     return tables;
 }
+
+/// Most tables have less than 50 kB; the largest, of textured dispersive glass, has 1 MB.
+Memo<LossPlan, LossTable>& keptTables() {
+    static Memo<LossPlan, LossTable> kept(128);
+    return kept;
+}
+
+}  // namespace
+
+std::vector<LossTable> lossTablesOf(const std::vector<LossPlan>& plans) {
+    return keptTables().of(plans, makeLossTables);
+}
+
+void forgetLossTables() { keptTables().forget(); }
 
 double microfacetLoss(double cosine, double eta, double alpha) {
     return Row{eta, alpha, nullptr}.loss(cosine);

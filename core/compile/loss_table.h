@@ -23,17 +23,20 @@ struct LossKey {
 struct Interface {
     double index = 0;                        ///< Inside over outside; 0: a metal.
     double film_index = 0, film_rounds = 0;  ///< Relative to the outside; 2 d / λ. 0: there is none.
+    auto operator<=>(const Interface&) const = default;
 };
 
 /// The surfaces of the rows of a table, in order.
 struct Across {
     std::vector<Interface> interfaces{{}};
     double first = 0, step = 1;  ///< Of what the kernel looks rows up by.
+    auto operator<=>(const Across&) const = default;
 };
 
 struct LossPlan {
     LossKey key;
     Across across;
+    auto operator<=>(const LossPlan&) const = default;
 };
 
 /// Rows by roughness or azimuth, side by side for what they are across.
@@ -45,8 +48,12 @@ struct LossTable {
 /// Directions that a table looks at: nearly all of its time.
 double stepsOf(const LossPlan& plan);
 
-/// All of them at the same time: most have few rows.
-std::vector<LossTable> makeLossTables(const std::vector<LossPlan>& plans);
+/// Makes all of them at the same time: most have few rows. The process keeps some of the tables, so that a
+/// scene that is compiled again, or another one of the same materials, has them at once. [any thread]
+std::vector<LossTable> lossTablesOf(const std::vector<LossPlan>& plans);
+
+/// Drops the tables that are kept, for tests that compare tables made twice.
+void forgetLossTables();
 
 /// L(θ): the share of light towards a view at `cosine` that GGX microfacets of width `alpha` lose between
 /// them, mirrored (and, unless `eta` is 0, refracted) once, Smith's shadowing correlated by height. `eta`:
