@@ -119,6 +119,9 @@ def case(*arguments, **options):
 # scenes
 
 def scene_cases():
+    """Texts that make a careless reader crash, hang or fill memory. The words and the place of each plain
+    refusal are checked by tests/unit_scene_refused.cpp."""
+
     def scene(asked, text, codes=3, words=(), files=None, arguments=("info", "scene.yaml"), **options):
         def prepare(folder):
             folder.write("scene.yaml", text)
@@ -149,27 +152,15 @@ def scene_cases():
             **options,
         )
 
-    scene("an empty file", "", words="there is nothing in this file")
-    scene("a comment alone", "# nothing\n", words="there is nothing in this file")
     scene("a byte-order mark alone", "\ufeff", words="there is nothing in this file")
-    scene("a NUL in the text", b"crt: 1\nx\0y", words="byte 0x00")
-    scene("Latin-1", b"crt: 1\ntitle: caf\xe9\n", words="byte 0xe9")
     scene("an overlong UTF-8 sequence", b"crt: 1\ntitle: \xc0\xaf\n", words="byte 0xc0")
-    scene("a PNG", b"\x89PNG\r\n\x1a\n", words="is not text")
     scene(
         "64 kB of noise",
         bytes(hashlib.sha512(str(i).encode()).digest()[0] for i in range(65536)),
         words="is not text",
     )
     scene("an escape sequence for terminals", "crt: 1\ntitle: \x1b[2J\n", words="byte 0x1b")
-    scene("a tab as indentation", "crt: 1\nfilm:\n\tresolution: [8, 8]\n", words="indent with blanks")
-    scene("an open bracket", HEAD + "outputs: [", words="not valid YAML")
     scene("an open quote", HEAD + 'title: "no end', words="not valid YAML")
-    scene("a key twice", HEAD + "film: {resolution: [4, 4]}\n", words="duplicate key 'film'")
-    scene("a merge key", HEAD + "camera: {<<: {fov: 3}}\n", words="merge keys")
-    scene("a tag", HEAD + "title: !!python/object:os.system x\n", words="tag")
-    scene("an alias of nothing", HEAD + "title: *nowhere\n", words="not valid YAML")
-    scene("an alias within its own value", HEAD + "objects: &a [*a]\n", words="a cycle has no end")
     scene(
         "a billion laughs",
         HEAD
@@ -182,27 +173,15 @@ def scene_cases():
     scene("a line of a megabyte", HEAD + "title: " + "x" * 1000000 + "\n", 0)
     scene("a key of a megabyte", HEAD + "x" * 1000000 + ": 1\n", words={"unknown key", "not valid YAML"})
     scene("50,000 unknown keys", HEAD + "".join(f"k{i}: 1\n" for i in range(50000)), words="more errors")
-    scene("two documents", GOOD + "---\n" + GOOD, words="second YAML document")
-    scene("a list", "- crt: 1\n", words="expected a map")
     scene("a number", "42\n", words="expected a map")
-    scene("another version", "crt: 2\n", words="'crt'")
-    scene("no version", "film: {resolution: [8, 8]}\n", words="'crt' is missing")
-    scene("the version not first", "title: x\ncrt: 1\n", words="must be the first key")
     key("a number that is none", "camera: {fov: nan}", "NaN")
-    key("an infinite number", "camera: {fov: .inf}", "infinity")
-    key("a number beyond a double", "camera: {position: [1e999, 0, 0]}", "outside the range")
-    key("a number in octal", "integrator: {max_depth: 012}", "octal")
-    key("a hexadecimal number", "integrator: {max_depth: 0x10}", "decimal")
-    key("yes for true", "integrator: {nee: yes}", "write true")
     for text, word in (
         ("{type: rough_dielectric, ior: 1.5, roughness: 1.5}", "'roughness'"),
         ("{type: rough_dielectric, ior: 1.5, roughness: -0.1}", "'roughness'"),
         ("{type: rough_dielectric, ior: 1.5, roughness: nan}", "NaN"),
         ("{type: rough_dielectric, ior: 1e9, roughness: 0.5}", "'ior'"),
-        ("{type: dielectric, ior: 1.5, absorption: -1}", "'absorption'"),
         ("{type: dielectric, ior: 1.5, absorption: {table: {nm: [360, 830], value: [1, -1]}}}",
          "'absorption'"),
-        ("{type: dielectric, ior: 1.5, absorption: .inf}", "infinity"),
         ("{type: dielectric, ior: 1.5, absorption: 1e300}", "'absorption'"),
         ("{type: thin_dielectric, ior: 0}", "'ior'"),
         ("{type: plastic, reflectance: 2}", "'reflectance'"),
@@ -226,16 +205,13 @@ def scene_cases():
         ("{type: dielectric, ior: 1.5, thin_film: {thickness_nm: 1e9, ior: 1.3}}", "'thickness_nm'"),
         ("{type: dielectric, ior: 1.5, thin_film: {thickness_nm: 300, ior: 0}}", "'ior'"),
         ("{type: dielectric, ior: 1.5, thin_film: 300}", "expected a map"),
-        ("{type: openpbr, subsurface_weight: 1}", "wanders below"),
         ("{type: openpbr, coat_weight: nan}", "NaN"),
         ("{type: openpbr, coat_weight: 1, coat_ior: 1e3}", "an index of 1 to 10"),
         ("{type: openpbr, coat_weight: 1, coat_color: -1}", "'coat_color'"),
         ("{type: openpbr, coat_weight: 1, coat_darkening: .inf}", "'coat_darkening'"),
         ("{type: openpbr, coat_weight: 1, transmission_weight: 1e-9}", "opaque"),
-        ("{type: openpbr, emission_luminance: -1}", "'emission_luminance'"),
         ("{type: openpbr, emission_luminance: .inf}", "'emission_luminance'"),
         ("{type: openpbr, fuzz_roughness: 1.01}", "'fuzz_roughness'"),
-        ("{type: openpbr, fuzz_weight: 1, emission_luminance: 1}", "fuzz"),
         ("{type: diffuse, reflectance: 1, roughness: -0.1}", "'roughness'"),
         ("{type: openpbr, base_metalness: 2}", "'base_metalness'"),
         ("{type: openpbr, base_color: {texture: /nowhere.png}}", "/nowhere.png"),
@@ -270,13 +246,11 @@ def scene_cases():
         spectrum_of = f"materials: {{m: {text}}}\nobjects: [{{{TRIANGLE}, material: m}}]\n"
         scene(f"the material {text}", HEAD + spectrum_of, 0)
     for size, word in (
-        ("[0, 8]", "must be"),
         ("[-8, 8]", "must be"),
         ("[8]", "a list of 2"),
         ("[8, 8, 8]", "a list of 2"),
         ("[1e9, 1]", "must be"),
         ("[8.5, 8]", "whole"),
-        ("[65535, 65535]", "a film has at most"),
     ):
         scene(f"a film of {size}", f"crt: 1\nfilm: {{resolution: {size}}}\n", words=word)
     scene(
@@ -287,21 +261,13 @@ def scene_cases():
         arguments=("scene.yaml", "-b", "fake", "-o", "a.pfm", "--spp", "1"),
         limits={resource.RLIMIT_AS: 4 << 30},
     )
-    for crop in ("[0, 0, 9, 8]", "[4, 4, 4, 8]", "[5, 0, 4, 8]"):
-        scene(f"a crop of {crop}", f"crt: 1\nfilm: {{resolution: [8, 8], crop: {crop}}}\n", words="window")
-    for fov in (0, 180, -10, "wide"):
-        key(f"a field of view of {fov}", f"camera: {{fov: {fov}}}", "fov")
-    key("a camera that looks at itself", "camera: {position: [1, 1, 1], target: [1, 1, 1]}", "looks nowhere")
-    key("up along the view", "camera: {position: [0, 0, 0], target: [0, 1, 0]}", "parallel")
-    key("up of no length", "camera: {up: [0, 0, 0]}", "length 0")
+    crop = "[5, 0, 4, 8]"
+    scene(f"a crop of {crop}", f"crt: 1\nfilm: {{resolution: [8, 8], crop: {crop}}}\n", words="window")
+    key("a field of view of -10", "camera: {fov: -10}", "fov")
     key("a camera at 1e300", "camera: {position: [1e300, 0, 0]}", codes=(0, 3))
-    key("a lens of negative radius", "camera: {aperture_radius: -1}", "aperture_radius")
     for name, value in (
-        ("samples", 0),
         ("samples", -1),
         ("samples", "1e30"),
-        ("seed", -1),
-        ("seed", 18446744073709551616),
         ("replicates", 3),
         ("type", "halton"),
     ):
@@ -310,26 +276,15 @@ def scene_cases():
             f"crt: 1\nsampler: {{{name}: {value}}}\n",
             words={"must be", "cannot be had", "whole number", "expected"},
         )
-    for value in (-1, "1e10", 1.5):
-        key(f"integrator.max_depth: {value}", f"integrator: {{max_depth: {value}}}", "max_depth")
     key("objects that are no list", "objects: 7", "expected a list")
     key("an object that is no map", "objects: [7]", "expected a map")
-    key("an object without geometry", "objects: [{material: m}]", "needs")
     shape("a mesh without faces", "{positions: [[0,0,0]]}", "'faces' is missing")
-    shape(
-        "faces that lead nowhere",
-        "{positions: [[0,0,0],[1,0,0],[0,1,0]], faces: [[0,1,7]]}",
-        "there are only 3",
-    )
-    shape("a negative index", "{positions: [[0,0,0],[1,0,0],[0,1,0]], faces: [[0,1,-1]]}", "must be")
     shape(
         "an index of 2^40",
         "{positions: [[0,0,0],[1,0,0],[0,1,0]], faces: [[0,1,1099511627776]]}",
         {"must be", "there are only"},
     )
     shape("an index of 1.5", "{positions: [[0,0,0],[1,0,0],[0,1,0]], faces: [[0,1,1.5]]}", "whole")
-    shape("a face of two corners", "{positions: [[0,0,0],[1,0,0],[0,1,0]], faces: [[0,1]]}", "3 or more")
-    shape("points in the plane", "{positions: [[0,0],[1,0],[0,1]], faces: [[0,1,2]]}", "3 numbers")
     shape("a face without area", "{positions: [[0,0,0],[1,0,0],[2,0,0]], faces: [[0,1,2]]}", codes=(0, 3))
     shape(
         "coordinates of 1e308",
@@ -346,58 +301,20 @@ def scene_cases():
         "{positions: [[0,0,0],[1,0,0],[0,1,0]], normals: [[0,0,0],[0,0,1],[0,0,1]], faces: [[0,1,2]]}",
         "length 0",
     )
-    shape(
-        "a transform by 0",
-        "{positions: [[0,0,0],[1,0,0],[0,1,0]], faces: [[0,1,2]]}",
-        "flattens",
-        extra=", transform: [{scale: 0}]",
-    )
-    shape(
-        "transforms to infinity",
-        "{positions: [[0,0,0],[1,0,0],[0,1,0]], faces: [[0,1,2]]}",
-        "beyond a double",
-        extra=", transform: [{scale: 1e200}, {scale: 1e200}]",
-    )
-    shape(
-        "a matrix that flattens",
-        "{positions: [[0,0,0],[1,0,0],[0,1,0]], faces: [[0,1,2]]}",
-        "inverted",
-        extra=", transform: [{matrix: [1,0,0,0,1,0,0,0,1,0,0,0,0,0,0,1]}]",
-    )
-    shape(
-        "no placement at all",
-        "{positions: [[0,0,0],[1,0,0],[0,1,0]], faces: [[0,1,2]]}",
-        "nowhere",
-        extra=", transforms: []",
-    )
-    scene(
-        "a material that is not there",
-        HEAD + f"objects: [{{{TRIANGLE}, material: m}}]\n",
-        words="there is no material",
-    )
-    scene("no material", HEAD + f"objects: [{{{TRIANGLE}}}]\n", words="'material' is missing")
     scene("a spectrum that is itself", HEAD + "spectra: {a: a}\n", words="defined by itself")
     scene("spectra in a circle", HEAD + "spectra: {a: b, b: c, c: a}\n", words="defined by itself")
     for text, word in (
-        ("2", "must be"),
-        ("-1", "must be"),
         ("{rgb: [1, 1]}", "3 numbers"),
-        ("{rgb: [2, 0, 0]}", "must be"),
         ("{rgb: [nan, 0, 0]}", "NaN"),
-        ("{table: {nm: [700, 400], value: [1, 1]}}", "must increase"),
-        ("{table: {nm: [400, 700], value: [1]}}", "wavelengths but"),
         ("{table: {nm: [], value: []}}", "a list"),
-        ("{blackbody: 0}", "must be"),
         ("{blackbody: -5}", "must be"),
         ("{blackbody: 1e300}", "must be"),
         ("{glass: sand}", "expected"),
-        ("{file: none.spd}", "cannot find"),
         ("{}", "empty map"),
-        ("[1, 2]", "expected"),
         ("{ref: nobody}", "there is no spectrum"),
     ):
         spectrum(f"a reflectance of {text}", text, word)
-    for text in ("1e26", "1e38", "1e308", "{blackbody: 6000, scale: 1e30}", "-1"):
+    for text in ("1e26", "1e38", "1e308", "{blackbody: 6000, scale: 1e30}"):
         scene(
             f"a radiance of {text}",
             HEAD + f"environment: {{radiance: {text}}}\n",
@@ -504,8 +421,6 @@ def scene_cases():
         ("{sky: {type: 1, zenith_luminance_cd_m2: 1e40, direction: [0, -1, 0]}}", "radiance goes up to"),
     ):
         scene(f"environment: {text}", GOOD + f"environment: {text}\n", words=words)
-    scene("an output of a kind unknown", HEAD + "outputs: [{file: a.docx}]\n", words="does not end in")
-    scene("an output twice", HEAD + "outputs: [{file: a.exr}, {file: a.exr}]\n", words="written twice")
     placement = "[{translate: [1, 2, 3]}]"
     scene(
         "10,000 moved placements behind 1,000 aliases (44 kB)",
