@@ -110,12 +110,14 @@ def test_every_configuration_has_its_verdict_and_why(converged):
 @needs_backend
 def test_figures_of_a_configuration_stand_in_its_row(converged, edited):
     def change(data):
+        # All that a fit has: on a busy machine the run has too few points for one of its own.
         fit = fit_of(data, "sampler=sobol")
+        fit["common_error"] = {"relative_rmse": 0.02, "reached": True, "at_first_point": False}
         fit["slope_against_samples"] = {"value": -0.806, "low": -0.848, "high": -0.764}
         fit["efficiency_per_second"] = {"value": 19.34, "low": 13.7, "high": 27.2}
         fit["time"] = {"before_first_sample_seconds": 0.02, "launch_seconds": {"value": 0.0033, "low": 0,
                        "high": 1}, "seconds_per_sample": {"value": 0.0107, "low": 0, "high": 1}, "r2": 1}
-        fit["error"].update(floor={"value": 1e-4, "low": 0.25e-4, "high": 4e-4}, flattening=True)
+        fit["error"] = {"floor": {"value": 1e-4, "low": 0.25e-4, "high": 4e-4}, "flattening": True}
         fit["targets"] = [
             {"relative_rmse": 0.01, "reached": True, "at_first_point": True,
              "samples_per_pixel": {"value": 12, "low": 1, "high": 20},
