@@ -18,7 +18,7 @@ from texts import texts  # noqa: E402
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 FOLDERS = ("bench", "core", "docs", "plugins", "python", "scripts", "tests")
-PAGES = ("README.md", "CONTRIBUTING.md")
+PAGES = ("CHANGELOG.md", "CONTRIBUTING.md", "README.md")
 # Texts that a user sees: strings of these folders, except of tests.
 SEEN = ("core", "plugins", "python/crt", "python/src")
 # With separate bounds, which may only fall; docs/stability.md is made from core/judge/verify.
