@@ -100,8 +100,7 @@ Command mergeCommand() {
                       .required = true},
                      {.names = "--scene",
                       .placeholder = "SCENE",
-                      .help = "the scene of the films; needed only for films that do not contain their "
-                              "development settings",
+                      .help = "scene of the films; only for films without development settings",
                       .read = [to](const std::string& text) { to->scene.file = text; },
                       .completion = completeScene()},
                      {.names = "--overwrite",

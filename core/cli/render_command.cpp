@@ -47,8 +47,8 @@ OptionGroup where(Job& job) {
         {backendOption(job.backend), deviceOption(job.integrator), threadsOption(job.integrator),
          {.names = "--kernel",
           .placeholder = "KIND",
-          .help = "lean: a kernel for this scene only; full: with all features; lean-only: lean, waiting "
-                  "for the compiler; same bits",
+          .help = "lean: for this scene only; full: all features; lean-only: waits for the compiler; same "
+                  "bits",
           .read = [&job](const std::string& text) {
               job.integrator.kernel = text == "full"        ? CRT_KERNEL_FULL
                                       : text == "lean-only" ? CRT_KERNEL_LEAN_ONLY
