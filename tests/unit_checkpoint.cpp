@@ -97,7 +97,7 @@ TEST_CASE("a checkpoint of a film with an impossible side is refused", "[checkpo
          {FilmShape{0, 0x81000000u, 4, kAovSquares}, FilmShape{0x81000000u, 0, 4, kAovSquares},
           FilmShape{0, 0, 4, kAovSquares}, FilmShape{65536, 1, 4, kAovSquares}}) {
         writeCheckpoint(path, Film(shape), kIdentity);
-        CHECK_THROWS_WITH(readCheckpoint(path), Contains(path) && Contains("1 to 65535 a side"));
+        CHECK_THROWS_WITH(readCheckpoint(path), Contains(path) && Contains("1 to 65535 per side"));
     }
 }
 
@@ -108,7 +108,7 @@ TEST_CASE("the largest film of a scene file is the largest of a checkpoint", "[c
     writeCheckpoint(path, Film({most, 1, 4, kAovSquares}), kIdentity);
     CHECK(readCheckpoint(path).first.shape().width == most);
     writeCheckpoint(path, Film({most + 1, 1, 4, kAovSquares}), kIdentity);
-    CHECK_THROWS_WITH(readCheckpoint(path), Contains("a side"));
+    CHECK_THROWS_WITH(readCheckpoint(path), Contains("per side"));
 }
 
 TEST_CASE("the format is what checkpoint.h says", "[checkpoint]") {
@@ -435,7 +435,7 @@ TEST_CASE("the record of a merged film is that of the first samples, with every 
     wrong.record->window = {0, 0, 2, 1};
     writeCheckpoint(directory / "wrong.crtfilm", Film({1, 1, 4, kAovSquares}), wrong);
     CHECK_THROWS_WITH(readCheckpoint(directory / "wrong.crtfilm"),
-                      Contains("record of its scene that belongs to a film of another size"));
+                      Contains("scene record that belongs to a film of another size"));
 }
 
 TEST_CASE("a checkpoint of another scene is refused with both hashes", "[checkpoint]") {

@@ -191,7 +191,7 @@ TEST_CASE("mix: what a scene may not say", "[composition][yaml]") {
     CHECK(says(refusal("  m: {type: two_sided, front: a, back: glass}\n"), "cannot be a side"));
     CHECK(says(refusal("  m: {type: mix, materials: [a, veil]}\n"), "give the opacity to 'm'"));
     CHECK(says(refusal("  m: {type: diffuse, reflectance: 1, opacity: -0.1}\n"), "'opacity'"));
-    CHECK(says(refusal("  m: {type: dielectric, ior: 1.5, absorption: 2, opacity: 0.5}\n"), "is closed"));
+    CHECK(says(refusal("  m: {type: dielectric, ior: 1.5, absorption: 2, opacity: 0.5}\n"), "be closed"));
 
     // Of glass with one inside, and with two.
     const auto mixOf = [](const char* one, const char* other) {

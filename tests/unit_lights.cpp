@@ -124,7 +124,7 @@ TEST_CASE("what a light cannot be is refused at its place", "[lights]") {
                               "{type: spot, position: [0, 0, 0], direction: [1, 0, 0], power_w: 1}",
                               "{type: directional, direction: [1, 0, 0], irradiance: 1}"})
         CHECK_THAT(refused(fmt::format("integrator: {{nee: false}}\nlights:\n  - {}\n", light)),
-                   Contains("found by light sampling alone") && Contains("scene.yaml:4:5"));
+                   Contains("only light sampling finds light 0") && Contains("scene.yaml:4:5"));
     // A sun is found by chance, too; a view of normals shows no light.
     parsed("integrator: {nee: false}\nlights: [{type: sun, direction: [0, -1, 0], radiance: 1}]\n");
     parsed("integrator: {nee: false, type: normals}\nlights: [" + point + ", power_w: 1}]\n");
@@ -139,7 +139,7 @@ TEST_CASE("what a light cannot be is refused at its place", "[lights]") {
     };
     CHECK_THROWS_WITH(compiled("{name: far, type: point, position: [1e18, 0, 0], power_w: 1}"),
                       Contains("the light 'far' is too far from the scene"));
-    CHECK_THROWS_WITH(compiled(point + ", power_w: 1e36}"), Contains("up to 1e+25"));
+    CHECK_THROWS_WITH(compiled(point + ", power_w: 1e36}"), Contains("is 1e+25"));
 }
 
 TEST_CASE("the sun stands where almanacs say", "[lights]") {

@@ -254,7 +254,7 @@ TEST_CASE("an mtllib whose name no file can have is missing like others", "[mesh
     CHECK(
         loadText("mtllib " + std::string(300, 'a') + "\n" + kTriangle + "f 1 2 3\n").mesh.triangles.size() ==
         1);
-    CHECK_THAT(log.text(), Contains("aaa…' is there"));
+    CHECK_THAT(log.text(), Contains("aaa…' does not exist"));
 }
 
 // Found by fuzzing: an OBJ that names itself has no materials.

@@ -227,7 +227,7 @@ TEST_CASE("parts of an OBJ have materials and emission by group, object or mater
                Contains("no face of 'lamp.obj' belongs to a material 'foot'"));
     CHECK_THAT(wrong("foot: {material: d}"), Contains("there is no material 'd'"));
     CHECK_THAT(wrong("foot: a"), Contains("expected a map such as {material: NAME}"));
-    CHECK_THAT(wrong("foot: {by: group}"), Contains("part 'foot' of object 0 says nothing"));
+    CHECK_THAT(wrong("foot: {by: group}"), Contains("part 'foot' of object 0 has no effect"));
     CHECK_THAT(wrong("foot: {color: a}"), Contains("unknown key 'color' in part 'foot' of object 0"));
     CHECK_THAT(wrong("foot: {material: a}, 'b*x': {material: a}"), Contains("'b*x'"));
 }

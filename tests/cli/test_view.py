@@ -60,7 +60,7 @@ class Picture(CliTest):
     def test_what_cannot_be_changed_is_refused_and_changes_nothing(self):
         view = View(self, "-b", "fake")
         before, _ = view.wait_until_done()
-        for wish, words in (({"white": "glwo"}, "no white 'glwo'"), ({"plane": "depht"}, "no plane"),
+        for wish, words in (({"white": "glwo"}, "no light 'glwo'"), ({"plane": "depht"}, "no plane"),
                             ({"focus": [0.5, 0.5], "exposure_ev": 3}, "pinhole"), ({"dolly": 0}, "dolly")):
             with self.assertRaises(urllib.error.HTTPError) as refused:
                 view.change(**wish)

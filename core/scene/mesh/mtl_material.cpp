@@ -378,10 +378,11 @@ std::string MtlSummary::text() const {
         text += fmt::format(", {} of them emitting", emitting->second);
     if (!decisions_.empty()) text += "; " + list(decisions_);
     if (!dropped_.empty()) text += "; dropped: " + list(dropped_);
-    if (!not_there_.empty())
-        text +=
-            fmt::format("; the image {}{} does not exist", inQuotes(*not_there_.begin()),
-                        not_there_.size() == 1 ? "" : fmt::format(" and {} more", not_there_.size() - 1));
+    if (not_there_.size() == 1)
+        text += fmt::format("; the image {} does not exist", inQuotes(*not_there_.begin()));
+    if (not_there_.size() > 1)
+        text += fmt::format("; {} images do not exist, such as {}", not_there_.size(),
+                            inQuotes(*not_there_.begin()));
     if (!unknown_.empty()) text += "; unknown: " + list(unknown_);
     if (!unreadable_.empty()) text += "; not understood:";
     for (const auto& [what, n] : unreadable_)
