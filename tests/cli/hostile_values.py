@@ -32,7 +32,7 @@ def scene_cases(case):
          "longitude_deg: 0}", "below the horizon"),
         ("{type: 12, zenith_luminance_cd_m2: 1, date: 9999-01-01, time: '12:00', latitude_deg: 0, "
          "longitude_deg: 0}", "1950"),
-        ("{type: 12, zenith_luminance_cd_m2: 1, direction: [0, -1, 0], spectrum: 0}", "no light")):
+        ("{type: 12, zenith_luminance_cd_m2: 1, direction: [0, -1, 0], spectrum: 0}", "no visible light")):
         scene(f"a sky: {sky}", HEAD + f"environment: {{sky: {sky}}}\n" + OBJECT, words)
     for sun, words in (
         ("direction: [0, -1, 0], illuminance_lx: -1", "illuminance_lx"),

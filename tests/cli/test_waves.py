@@ -33,9 +33,9 @@ class Waves(CliTest):
     def test_kernel_texts_of_others_are_refused_with_their_code(self):
         if "opencl" not in harness.real_backends():
             self.skipTest("opencl has no device")
-        os.mkdir(self.path("kernels"))
-        os.chmod(self.path("kernels"), 0o777)
-        self.write("kernels/wavefront.h", "")
+        os.makedirs(self.path("kernels/schedule"))
+        os.chmod(self.path("kernels/schedule"), 0o777)
+        self.write("kernels/schedule/wavefront.h", "")
         run = self.crt("scene.yaml", "-b", "opencl", "-o", "a.pfm", "-q", "--no-cache", expect=4,
                        CRT_BACKEND_PATH="", CRT_KERNEL_DIR=self.path("kernels"))
         self.assert_one_error(run, "the kernels of CRT_KERNEL_DIR are refused: everyone can write to")
