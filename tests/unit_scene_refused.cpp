@@ -295,8 +295,8 @@ TEST_CASE("spectra that cannot be", "[scene_yaml][refused]") {
          {std::tuple{"subsurface_weight: 1", "subsurface scattering", "remove 'subsurface_weight'"},
           std::tuple{"coat_weight: 0.5, transmission_weight: 0.5", "coats lie on what is opaque",
                      "leave 'coat_weight'"},
-          std::tuple{"coat_weight: {checker: [0, 1]}, coat_ior: 0.9", "must be 1 to 10", "from 1 to 10"},
-          std::tuple{"coat_weight: 1, coat_ior: 11", "must be 1 to 10", "from 1 to 10"},
+          std::tuple{"coat_weight: {checker: [0, 1]}, coat_ior: 0.9", "an index of 1 to 10", "from 1 to 10"},
+          std::tuple{"coat_weight: 1, coat_ior: 11", "an index of 1 to 10", "from 1 to 10"},
           std::tuple{"coat_weight: 1, coat_roughness: 0.5, coat_roughness_anisotropy: 0.5",
                      "must be isotropic", "leave 'coat_roughness_anisotropy'"},
           std::tuple{"coat_weight: 1, coat_roughness: 0.5, base_metalness: 1, "

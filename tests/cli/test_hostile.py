@@ -211,7 +211,7 @@ def scene_cases():
         ("{type: dielectric, ior: 1.5, thin_film: {thickness_nm: 300, ior: 0}}", "'ior'"),
         ("{type: dielectric, ior: 1.5, thin_film: 300}", "expected a map"),
         ("{type: openpbr, coat_weight: nan}", "NaN"),
-        ("{type: openpbr, coat_weight: 1, coat_ior: 1e3}", "must be 1 to 10"),
+        ("{type: openpbr, coat_weight: 1, coat_ior: 1e3}", "an index of 1 to 10"),
         ("{type: openpbr, coat_weight: 1, coat_color: -1}", "'coat_color'"),
         ("{type: openpbr, coat_weight: 1, coat_darkening: .inf}", "'coat_darkening'"),
         ("{type: openpbr, coat_weight: 1, transmission_weight: 1e-9}", "opaque"),
