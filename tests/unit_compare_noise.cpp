@@ -240,7 +240,7 @@ TEST_CASE("words, figures and JSON of a noise comparison agree in every branch",
     for (const auto& [first, second] :
          {std::pair{withMetadata(a, kErrorDofKey, "3"), b}, {a, withMetadata(b, kErrorDofKey, "3")}}) {
         const auto [text, json] = said(first, second);
-        CHECK_THAT(text, Contains("pixels            not tested: a variance of 3 degrees of freedom"));
+        CHECK_THAT(text, Contains("pixels            not tested: a variance with 3 degrees of freedom"));
         CHECK(json["pixels"]["untested"].is_string());
     }
 
