@@ -59,14 +59,14 @@ OptionGroup asked(Request& to) {
           .choices = levels},
          {.names = "--part",
           .placeholder = "I/N",
-          .help = "only every N-th of these cases, from the I-th on: N runs ask them all",
+          .help = "only every N-th of these cases, from the I-th on: N runs cover all",
           .read = {}},
          {.names = "--list", .placeholder = {}, .help = "list the cases without running them", .read = {}}},
         to);
 }
 
 OptionGroup ofWhom(Request& to) {
-    return passedOn("Of whom",
+    return passedOn("Backend",
                     {backendOption(to.backend),
                      {.names = "--plugin-path",
                       .placeholder = "DIR",
