@@ -55,7 +55,7 @@ struct Case {
     std::string source;     ///< Where the answer comes from.
     std::string tolerance;  ///< As in the outcomes.
     Level level = Level::Commit;
-    std::uint64_t needs = 0;  ///< Features (dialect/features.h) without which a backend cannot be asked.
+    std::uint64_t needs = 0;  ///< Features (dialect/features.h) that a backend must have for this case.
     void (*run)(Context&) = nullptr;
 
     char group() const { return id.front(); }

@@ -94,8 +94,8 @@ std::string readText(const std::string& file) {
     }
 }
 
-/// The line on a terminal that tells which case runs, and since when. Cases take from a millisecond to a
-/// minute: what is left cannot be told from what is done.
+/// A progress line on a terminal: the current case and the elapsed time. Cases take from a millisecond to a
+/// minute, so the time left cannot be estimated from the cases that are done.
 class Line {
 public:
     Line(std::size_t cases, bool quiet) : cases_(cases), shown_(!quiet && isatty(STDERR_FILENO) != 0) {}

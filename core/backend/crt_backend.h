@@ -9,7 +9,7 @@
  * Versioning. Every struct begins with its own size. A minor revision only appends members; a reader uses a
  * member only if the writer's struct_size covers it. A change of meaning or order is a new major version and
  * a new symbol name. The layout hash covers kernel/dialect/layout.h, channels.h and features.h: the scene
- * blob is read as C structs, so it must be equal. The bits version says that samples are the same: it must
+ * blob is read as C structs, so it must be equal. Equal bits versions mean equal samples: it must
  * be equal too, or one image would hold samples of two renderers.
  *
  * Threads. Each function says who may call it: [owner thread] is the one thread at a time that uses an

@@ -14,7 +14,7 @@
 namespace crt {
 
 /// The pixels of the estimate. Those of one colour of a checkerboard are independent of those of the other:
-/// what the even ones decide, the odd ones judge.
+/// the even pixels make a decision, and the odd ones measure its error.
 enum class PixelSet { All, Even, Odd };
 
 /// Variance of the pixels' means of Y.

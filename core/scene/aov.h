@@ -1,5 +1,5 @@
 /// The rows of kernel/dialect/channels.h for the host: what a film holds of each pixel beside its colour,
-/// and what an image can be asked for.
+/// and the names of its planes.
 #pragma once
 
 #include "kernel/dialect/channels.h"

@@ -1,5 +1,5 @@
-/// Length units of a scene. Lengths stay as the scene has them; light that spreads over square metres is
-/// what depends on it.
+/// Length units of a scene. Lengths stay as the scene has them; the unit changes only light that spreads
+/// over square metres.
 #pragma once
 
 #include <string>

@@ -110,7 +110,7 @@ def test_every_configuration_has_its_verdict_and_why(converged):
 @needs_backend
 def test_figures_of_a_configuration_stand_in_its_row(converged, edited):
     def change(data):
-        # A busy machine leaves the run too few points for a fit.
+        # Every field of a fit: on a busy machine the run has too few points to fit one.
         fit = fit_of(data, "sampler=sobol")
         fit["common_error"] = {"relative_rmse": 0.02, "reached": True, "at_first_point": False}
         fit["slope_against_samples"] = {"value": -0.806, "low": -0.848, "high": -0.764}

@@ -258,7 +258,7 @@ private:
 
     /// Libraries, drivers and caches are warmed up before any start-up is timed: otherwise the first
     /// configuration would pay for all. Where starts take so long that little time would be left, it is not
-    /// done, and said.
+    /// done, and reported.
     void warmUp(const Key& key, const ConfigurationRun::LoadScene& load) {
         if (elapsed() < (kReferenceShare + kWarmUpShare) * request_.seconds) {
             ConfigurationRun(key, load, nullptr, request_.integrator).prepare();

@@ -40,7 +40,7 @@ CRT_FN CRT_GLOBAL const CrtComposition *crt_compositions(const CrtContext *ctx) 
     return CRT_ARRAY(CrtComposition, ctx->blob, ctx->scene->compositions);
 }
 
-/* A place on a triangle or a shape, as textures are asked for it. */
+/* The coordinates of a point on a triangle or a shape, for texture look-ups. */
 typedef struct CrtFacePlace {
     u32 id;     /* number of the primitive, of an instance that of its mesh; for tangents, too */
     f32 b1, b2; /* barycentrics of the second and third vertex; triangles alone */

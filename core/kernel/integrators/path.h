@@ -71,7 +71,7 @@ CRT_FN int crt_path_vertex_passing(const CrtContext *ctx, CrtPath *path, CrtRayC
         const u32 depth = path->depth;
         alive = crt_shade(ctx, path, hit, &shadow);
         if (!(CRT_HAS(NEE) && shadow.pending)) return alive;
-        /* On processors a search that never asks for panes is faster: 2 % of all instructions. On GPUs a
+        /* On processors a search without panes is faster: 2 % of all instructions. On GPUs a
            second copy of the search spills 400 bytes of registers. */
         if (CRT_SIMD8 && !passable) {
             crt_resolve_shadow(ctx, path, &shadow, rays);

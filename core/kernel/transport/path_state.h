@@ -3,7 +3,7 @@
  * where a schedule keeps it in memory.
  *
  * CRT_PATH_STATE(VERTEX, TREE, BEGIN, FIRST) calls, for each row, one of these with (ROW, declarations,
- * lanes). Which one says when the row changes:
+ * lanes). It states when the row changes:
  *
  *   VERTEX  at each vertex
  *   TREE    at each vertex, in scenes with a tree of lights

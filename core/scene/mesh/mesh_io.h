@@ -41,7 +41,7 @@ struct LoadedMesh {
 /// no face, or whose faces name vertices that are not there. Errors that do not affect the whole file are
 /// warnings: faces of vertices that are not finite (left out), of no area (left out, even if that leaves
 /// none), of normals that are not there or have no direction (shaded flat); names that no MTL defines; what
-/// crt has no place for. One line says what became of the materials.
+/// crt does not support. One line summarises the materials.
 LoadedMesh loadObj(const std::string& path, const ObjOptions& options = {});
 
 }  // namespace crt

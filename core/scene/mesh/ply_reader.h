@@ -23,7 +23,7 @@ struct PlyOptions {
 /// of any type; of faces vertex_indices, and texcoord (two for each corner, as MeshLab writes them). Throws
 /// crt::Error(Scene) for a file that is missing, has another format, is not what its header says, whose
 /// faces name vertices that are not there, or that has no face that can be seen. Errors that do not affect
-/// the whole file are warnings, as for an OBJ; one line says what was left out.
+/// the whole file are warnings, as for an OBJ; one line lists everything left out.
 LoadedMesh loadPly(const std::string& path, const PlyOptions& options = {});
 
 /// The same of a file's content, which is gone when this returns. `rows_at_a_time` changes nothing but what
