@@ -6,6 +6,7 @@
 #include "catch.h"
 #include "compile/compile.h"
 #include "kernel/schedule/pixel.h"
+#include "verify/shapes.h"
 
 #include <cmath>
 #include <cstdint>
@@ -93,6 +94,37 @@ inline CrtContext contextOf(const crt::CompiledScene& compiled) {
 template <class T>
 const T* arrayOf(const crt::CompiledScene& compiled, CrtSpan span) {
     return CRT_ARRAY(T, compiled.data(), span);
+}
+
+/// Triangles of all sizes and shapes, anywhere within ±1.
+inline crt::Mesh soup(Random& random, std::uint32_t count) {
+    crt::Mesh mesh;
+    for (std::uint32_t i = 0; i < count; ++i) {
+        const crt::Vec3d p{random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1)};
+        const double size = std::pow(10.0, random.uniform(-3, 0));
+        const crt::Vec3d a = times(random.direction(), size),
+                    b = times(random.direction(), size * std::pow(10.0, random.uniform(-3, 0)));
+        // Some lie in planes of constant x, y or z: their boxes are flat.
+        const auto flatten = [&](crt::Vec3d v) {
+            if (i % 4 < 3) v[i % 4] = 0;
+            return i % 8 < 4 ? v : plus(v, {});
+        };
+        crt::verify::addTriangle(mesh, p, plus(p, i % 8 < 4 ? flatten(a) : a),
+                                 plus(p, i % 8 < 4 ? flatten(b) : b));
+    }
+    return mesh;
+}
+
+inline vec3 vertexOf(const CrtTriangle& t, u32 i) { return make_vec3(t.p[i], t.p[3 + i], t.p[6 + i]); }
+
+/// The portable loop: every slot in turn, one at a time.
+inline CrtHit oneByOne(const CrtContext& ctx, CrtRay ray) {
+    const auto* triangles = CRT_ARRAY(CrtTriangle, ctx.blob, ctx.scene->triangles);
+    const CrtShear shear = crt_shear(ray);
+    CrtHit best = crt_no_hit(ray.reach);
+    for (u32 slot = 0; slot < ctx.scene->triangle_count; ++slot)
+        crt_test_closest(triangles, slot, shear, &best);
+    return best;
 }
 
 /// One object, one mesh, nothing else; the camera looks at it from −z.

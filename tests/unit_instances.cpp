@@ -46,7 +46,7 @@ Vec3d randomPoint(Random& random, double within) {
 }
 
 /// Triangles of all sizes, anywhere within ±1, with normals and texture coordinates.
-Mesh soup(Random& random, std::uint32_t count) {
+Mesh texturedSoup(Random& random, std::uint32_t count) {
     Mesh mesh;
     for (std::uint32_t i = 0; i < count; ++i) {
         const Vec3d p = randomPoint(random, 1);
@@ -67,7 +67,7 @@ Mesh soup(Random& random, std::uint32_t count) {
 /// Two meshes in many places each, beside triangles that are where they stand and a sphere; textured, so
 /// that coordinates are kept.
 Scene crowd(Random& random, const std::vector<Vec3d>& scales, Sharing sharing, double spread = 1) {
-    Scene scene = sceneOf(soup(random, 40), crt::Accelerator::Bvh);
+    Scene scene = sceneOf(texturedSoup(random, 40), crt::Accelerator::Bvh);
     scene.textures.emplace_back();
     scene.textures.back().kind = crt::Texture::Kind::Checker;
     scene.materials.resize(1);
@@ -75,7 +75,7 @@ Scene crowd(Random& random, const std::vector<Vec3d>& scales, Sharing sharing, d
     scene.materials[0].reflectance_texture = 0;
     scene.objects[0].material = 0;
     for (const std::uint32_t triangles : {60u, 300u}) {
-        scene.meshes.push_back(soup(random, triangles));
+        scene.meshes.push_back(texturedSoup(random, triangles));
         Object object;
         object.mesh = static_cast<std::uint32_t>(scene.meshes.size() - 1);
         object.material = 0;
@@ -115,7 +115,7 @@ MeshSlots meshSlots(const CrtContext& ctx, const CrtInstance& instance) {
 }
 
 /// Every triangle of the scene in turn, whatever the trees.
-CrtHit oneByOne(const CrtContext& ctx, CrtRay ray) {
+CrtHit everyInstanceInTurn(const CrtContext& ctx, CrtRay ray) {
     const auto* triangles = CRT_ARRAY(CrtTriangle, ctx.blob, ctx.scene->triangles);
     const auto* instances = CRT_ARRAY(CrtInstance, ctx.blob, ctx.scene->instances);
     const CrtShear shear = crt_shear(ray);
@@ -197,7 +197,7 @@ TEST_CASE("trees of instances find what a loop over their triangles finds, bit b
             REQUIRE(ctx.scene->instances.count == 2 * scales->size());
             for (int i = 0; i < 40000; ++i) {
                 CrtRay ray = rayAtInstance(ctx, random);
-                const CrtHit expected = oneByOne(ctx, ray);
+                const CrtHit expected = everyInstanceInTurn(ctx, ray);
                 wrong += !sameBits(crt_bvh_closest(&ctx, ray), expected);
                 // To half the way, to the hit and just beyond.
                 ray.reach = expected.t * std::array<f32, 3>{0.5f, 1.0f, 1.0001f}[random.below(3)];
@@ -429,7 +429,7 @@ TEST_CASE("places that flatten a mesh are written out, the others are not", "[in
 
 TEST_CASE("an instance costs little more than its record", "[instances]") {
     Random random(3705);
-    Scene scene = sceneOf(soup(random, 20000));
+    Scene scene = sceneOf(texturedSoup(random, 20000));
     scene.objects[0].sharing = Sharing::Never;
     const std::size_t once = crt::compileScene(scene, 0).size_bytes;
     scene.objects[0].sharing = Sharing::Always;

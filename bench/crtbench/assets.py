@@ -158,25 +158,7 @@ def measure(program, arguments):
     results.table(["files", "for example", "what crt says"], [[row[0], row[1], row[3]] for row in rows])
     claims(results, arguments, backend, corpora)
     if scenes:
-        results.heading("Scenes of pbrt and Mitsuba")
-        results.paragraph(
-            f"Each after `crt import`, {foreign_scenes.SIDE} pixels on the longer side, "
-            f"{foreign_scenes.SAMPLES} samples. *Ratio*: the mean luminance over that of the reference "
-            "image that comes with the scene. *What changes the picture a lot*: warnings of the import. A "
-            f"picture is black when its mean is below {foreign_scenes.BLACK:g} of white, and white "
-            f"when more than {foreign_scenes.WHITE:.0%} of its values are.")
-        results.table(["scene", "crt", "ratio", "what changes the picture a lot"],
-                      [[cell(str(c)) for c in row] for row in foreign_scenes.table(scenes)])
-        results.claim(
-            "Public scenes of pbrt and Mitsuba",
-            f"Each after `crt import`, {foreign_scenes.SIDE} pixels on the longer side, "
-            f"{foreign_scenes.SAMPLES} samples. *Ratio*: the mean luminance over that of the reference "
-            f"image that "
-            "comes with the scene.",
-            ["scene", "crt", "ratio", "what changes the picture a lot"],
-            [[cell(str(c)) for c in row] for row in foreign_scenes.table(scenes)],
-            name="assets-scenes",
-        )
+        claim_scenes(results, scenes)
     results.data = {
         name: [{"file": m.name, "verdict": m.verdict()}
                | ({"error": m.error} if not m.renders() else {"warnings": m.warnings} if m.warnings else {})
@@ -236,6 +218,28 @@ def claims(results, arguments, backend, corpora):
     )
 
 
+def claim_scenes(results, scenes):
+    how = (f"Each after `crt import`, {foreign_scenes.SIDE} pixels on the longer side, "
+           f"{foreign_scenes.SAMPLES} samples. ")
+    rows = foreign_scenes.by_repository(scenes)
+    total = ["together", *(sum(row[k] for row in rows) for k in range(1, 6))]
+    results.claim(
+        f"{total[2]} of {total[1]} public scenes of pbrt and Mitsuba render",
+        how + "*Stand-ins*: scenes some of whose files this copy of the repository lacks and others "
+        "replace; they are not compared. *Compared*: the mean luminance with that of the reference image "
+        f"that comes with the scene. *Close*: within {foreign_scenes.CLOSE:.0%}.",
+        ["repository@commit", "scenes", "render", "stand-ins", "compared", "close"], [*rows, total],
+        name="assets-scenes")
+    results.claim(
+        "Scenes that are refused or differ, and why",
+        how + "*Ratio*: the mean luminance over that of the reference. A picture is black when its mean is "
+        f"below {foreign_scenes.BLACK:g} of white, and white when more than {foreign_scenes.WHITE:.0%} of "
+        "its values are.",
+        ["scene", "crt", "ratio", "why"],
+        [[cell(str(c)) for c in row] for row in foreign_scenes.exceptions(scenes)],
+        name="assets-scenes-why")
+
+
 def counts(models):
     renders = sum(m.renders() for m in models)
     refused = sum(m.refused() for m in models)
@@ -244,7 +248,7 @@ def counts(models):
 
 def parts(warning):
     """The entries of one warning, without the name of the file."""
-    listed = warning.split(": ignored or approximated: ")
+    listed = warning.split(": not in the scene as in the file: ")
     return listed[1].split("; ") if len(listed) == 2 else [warning]
 
 

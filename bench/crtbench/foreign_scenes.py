@@ -1,7 +1,12 @@
-"""Scenes of pbrt and Mitsuba as crt renders them, next to the reference images that come with them."""
+"""Scenes of pbrt and Mitsuba as crt renders them, next to the reference images that come with them.
 
+Files that a copy of a repository lacks may have stand-ins (a grey texture, a small mesh), so that the rest
+renders. FOLDER/stand-ins.txt lists them, one path a line; scenes above them are not compared."""
+
+import functools
 import json
 import math
+import pathlib
 import re
 import subprocess
 import sys
@@ -10,6 +15,9 @@ SIDE = 128  # Pixels of the longer side.
 SAMPLES = 64
 SECONDS_AT_MOST = 300
 BLACK, WHITE = 0.002, 0.9  # Mean of the encoded picture; share of it that is white.
+CLOSE = 0.05  # Of the reference's mean: scenes that differ by more are listed with the cause.
+STAND_INS = "stand-ins.txt"
+CAUSES = pathlib.Path(__file__).parents[1] / "foreign_scenes.tsv"
 
 
 def scenes(folder):
@@ -21,6 +29,20 @@ def scenes(folder):
         is_mitsuba = re.search(r"<scene\b", text) and re.search(r"<(sensor|camera|include)\b", text)
         if "WorldBegin" in text or is_mitsuba:
             yield path
+
+
+@functools.cache
+def stand_ins(folder):
+    """Paths below the folder of files that stand in for missing ones."""
+    listed = folder / STAND_INS
+    return [folder / line for line in listed.read_text().splitlines()] if listed.is_file() else []
+
+
+@functools.cache
+def causes():
+    """The causes of differences that no loss of the import names, by the ends of paths."""
+    rows = [line.split("\t") for line in CAUSES.read_text().splitlines() if not line.startswith("#")]
+    return dict(rows)
 
 
 def reference(path):
@@ -39,6 +61,7 @@ class Scene:
     def __init__(self, program, backend, folder, path):
         self.name = str(path.relative_to(folder))
         self.ratio = self.black = self.white = None
+        self.stand_ins = [file.name for file in stand_ins(folder) if path.parent in file.parents]
         self.losses, self.warnings, self.error = [], [], None
         made = program.scratch / "scene.yaml"
         done = self.run(program, [sys.executable, "-m", "crt", "import", path, "-o", made, "--overwrite"])
@@ -86,7 +109,8 @@ class Scene:
         return not (self.black or self.white) or bool(self.losses or self.warnings)
 
     def holds(self):
-        return self.verdict == "renders" and self.says_why()
+        refused = self.verdict.endswith("with 3") and bool(self.error)
+        return refused or self.verdict == "renders" and self.says_why()
 
 
 JUDGE = """
@@ -117,12 +141,39 @@ def last_error(said):
     return errors[-1] if errors else said.strip()[-200:]
 
 
-def table(found):
-    """Rows of a page: name, what crt does, its brightness over the reference's, and the large losses."""
+    def is_compared(self):
+        return self.ratio is not None and math.isfinite(self.ratio) and not self.stand_ins
+
+    def is_close(self):
+        return self.is_compared() and abs(self.ratio - 1) <= CLOSE
+
+    def why(self):
+        """The causes of a difference from the reference, in one text."""
+        losses = [re.sub(r"^[^ ]+:\d+: ", "", loss) for loss in self.losses]
+        cause = next((cause for end, cause in causes().items() if self.name.endswith(end)), None)
+        return "; ".join(filter(None, [self.error, cause, *losses]))
+
+
+def by_repository(found):
+    """Rows: scenes, how many render, are compared with a reference, and are close to it."""
+    rows = []
+    for name in dict.fromkeys(name for name, _ in found):
+        of_it = [scene for other, scene in found if other == name]
+        rows.append([name, len(of_it), sum(s.verdict == "renders" for s in of_it),
+                     sum(bool(s.stand_ins) for s in of_it), sum(s.is_compared() for s in of_it),
+                     sum(s.is_close() for s in of_it)])
+    return rows
+
+
+def exceptions(found):
+    """Rows of what is refused, black, white, or not close to its reference: name, what crt does, its
+    brightness over the reference's, and why."""
     rows = []
     for name, scene in found:
         seen = "black" if scene.black else "white" if scene.white else ""
-        why = "; ".join(re.sub(r"^[^ ]+:\d+: ", "", loss) for loss in scene.losses) or scene.error or ""
-        ratio = f"{scene.ratio:.3f}" if scene.ratio is not None and math.isfinite(scene.ratio) else ""
-        rows.append([f"{name}/{scene.name}", scene.verdict + (f", {seen}" if seen else ""), ratio, why])
+        if scene.verdict == "renders" and not seen and (scene.is_close() or not scene.is_compared()):
+            continue
+        ratio = f"{scene.ratio:.3f}" if scene.is_compared() else ""
+        rows.append([f"{name.partition('+')[2].partition('@')[0]}/{scene.name}",
+                     scene.verdict + (f", {seen}" if seen else ""), ratio, scene.why()])
     return rows

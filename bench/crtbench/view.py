@@ -49,7 +49,7 @@ class View:
     def next_picture(self, until=float("inf")):
         """The status with the next picture; nothing after that time."""
         while time.monotonic() < until:
-            newer = self.url("/state", after=self.version, picture=self.picture)
+            newer = self.url("/sight", after=self.version, picture=self.picture)
             with urllib.request.urlopen(newer) as reply:
                 content = reply.read()
             (length,) = struct.unpack_from("<I", content)

@@ -93,7 +93,7 @@ HttpReply answerPage(Viewer& viewer, const HttpRequest& request) {
     constexpr const char* kJson = "application/json";
     const std::string what = request.method + " " + request.path;
     if (what == "GET /") return wholePage();
-    if (what == "GET /state") return state(viewer, request);
+    if (what == "GET /sight") return state(viewer, request);
     if (what == "POST /change") return change(viewer, request);
     if (what == "GET /pixel") {
         const auto at = [&](const char* key) {

@@ -8,7 +8,7 @@
 
 namespace crt {
 
-/// The page itself at "/"; "/state", which waits for something newer than the page has; "/change", "/pixel",
+/// The page itself at "/"; "/sight", which waits for something newer than the page has; "/change", "/pixel",
 /// "/devices", "/image.exr". Throws crt::Error as the Viewer does.
 HttpReply answerPage(Viewer& viewer, const HttpRequest& request);
 

@@ -89,6 +89,19 @@ def test_a_clamp_and_metals_without_loss_are_said(tmp_path):
     assert "light that a rough metal loses between its facets" in said
 
 
+def test_an_index_of_0_or_less_renders_and_is_said(tmp_path):
+    of_rgb = '<rgb name="eta" value="-0.05, 4, 4.7"/><rgb name="k" value="0, 0.1, 1.3"/>'
+    of_number = '<spectrum name="eta" value="0"/><spectrum name="k" value="1"/>'
+    made = [of_mitsuba(tmp_path, f'<shape type="sphere"><bsdf type="{kind}">{values}</bsdf></shape>')
+            for kind in ("conductor", "roughconductor") for values in (of_rgb, of_number)]
+    made.append(crt.import_scene(written(
+        tmp_path, "s.pbrt", HEAD + 'WorldBegin\nMaterial "conductor" "spectrum eta" [400 0 700 0] '
+        '"spectrum k" [400 1 700 1]\n' + SPHERE)))
+    for one in made:
+        assert ("an 'eta' of 0 or less", "0.01") in [(loss.what, loss.instead) for loss in one.losses]
+        assert np.isfinite(rendered(one.scene, 1)).all()
+
+
 def test_all_missing_files_are_listed_at_once(tmp_path):
     written(tmp_path, "there.png", b"")
     body = "".join(f'<shape type="{kind}"><string name="filename" value="{name}"/></shape>\n'

@@ -37,7 +37,7 @@ class View:
 
     def state(self, after=0):
         """The status, and the picture's bytes [height][width][4]."""
-        reply = self.get("/state", after=after, picture=0)
+        reply = self.get("/sight", after=after, picture=0)
         (length,) = struct.unpack_from("<I", reply)
         return json.loads(reply[4:4 + length]), reply[4 + length:]
 

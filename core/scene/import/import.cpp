@@ -116,7 +116,7 @@ ImportedModel importModel(GltfFiles& files, const std::string& path, const Impor
     }
     std::string text = fmt::format("# {}, imported by crt.\n{}", inOneLine(name), about);
     if (const std::vector<std::string> lost = losses.list(); !lost.empty()) {
-        logWarning("{}: ignored or approximated: {}", path, fmt::join(lost, "; "));
+        logWarning("{}: not in the scene as in the file: {}", path, fmt::join(lost, "; "));
         text += "# Not as in the file:\n";
         for (const std::string& loss : lost) text += fmt::format("#   - {}\n", inOneLine(loss));
     }

@@ -65,7 +65,7 @@ function forgetProgram() {
 
 async function look() {
   const picture = view.picture ? view.picture.number : 0;
-  const reply = await fetch(address("/state", { after: view.version, picture }),
+  const reply = await fetch(address("/sight", { after: view.version, picture }),
     { signal: AbortSignal.timeout(25000) });
   if (reply.status === 403) throw new Error("the token of this page is no longer valid");
   if (!reply.ok) throw new Error("the program ends");

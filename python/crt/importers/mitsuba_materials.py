@@ -152,6 +152,9 @@ class Materials:
         if plugin.has("eta", "k"):
             plugin.get("material")
             eta, k = values.spectrum(plugin, "eta", 0.2), values.spectrum(plugin, "k", 3.0)
+            eta, changed = spectra.index_above_0(eta)
+            if changed:
+                self.losses.add(plugin.place, "an 'eta' of 0 or less", f"{spectra.LEAST_INDEX}")
             outside = self.index(plugin, "ext_eta", "vacuum") if plugin.has("ext_eta") else 1
             return {"eta": spectra.scaled(eta, 1 / outside), "k": spectra.scaled(k, 1 / outside)}
         name = str(plugin.get("material", "none"))

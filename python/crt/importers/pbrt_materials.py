@@ -149,6 +149,9 @@ class Materials:
         for metal in spectra.METALS:
             if (eta, k) == ({"data": f"metals/{metal}/n"}, {"data": f"metals/{metal}/k"}):
                 return {"metal": metal}
+        eta, changed = spectra.index_above_0(eta)
+        if changed:
+            self.losses.add(found.place, "an 'eta' of 0 or less", f"{spectra.LEAST_INDEX}")
         return {"eta": eta, "k": k}
 
     def of_conductor(self, found):

@@ -79,6 +79,20 @@ def scaled(spectrum, factor):
     return spectrum | {"scale": spectrum.get("scale", 1) * float(factor)}
 
 
+LEAST_INDEX = 0.01
+
+
+def index_above_0(index):
+    """An index of refraction, whose values of 0 or less become LEAST_INDEX; and whether it had any."""
+    if isinstance(index, (int, float)):
+        return max(index, LEAST_INDEX), index <= 0
+    if "table" not in index:
+        return index, False
+    found = index["table"]["value"]
+    raised = [value if value > 0 else LEAST_INDEX for value in found]
+    return index | {"table": index["table"] | {"value": raised}}, raised != found
+
+
 def planck(kelvin, nm):
     """W·m⁻²·sr⁻¹·nm⁻¹."""
     metres = np.asarray(nm, float) * 1e-9
