@@ -1,6 +1,6 @@
-// Rays against triangles, alone, eight at a time, through boxes and trees: nothing leaks through an edge, and
-// nothing is culled that would be hit. A separate executable, compiled for AVX2 like the kernels of the Embree
-// backend.
+// Rays against triangles, alone, eight at a time, through boxes and trees: nothing leaks through an edge,
+// and nothing is culled that would be hit. A separate executable, compiled for AVX2 like the kernels of the
+// Embree backend.
 //
 // Over 450 lines: a separate executable, since it is compiled for another processor.
 #include "kernel_test.h"
