@@ -2,11 +2,12 @@
 // and checks that none spills more than a few registers. Needs no GPU. Prints registers and compile time of
 // each variant.
 //
-//     nvrtc_variants [--arch 90] [--part I N] [--only] [SCENE.yaml …]
+//     nvrtc_variants [--arch 90] [--part I N] [--precompiled LOG] [--only] [SCENE.yaml …]
 //
 // The masks: everything, each sampler and accelerator, each kind of material, and those of the scenes given,
 // as a render of the file compiles them. --only: those of the scenes that follow, alone. --part: every
-// N-th variant, from the I-th on.
+// N-th variant, from the I-th on. --precompiled: the kernel with everything in is judged by what nvcc has
+// written into LOG while the build compiled it, and is not compiled again.
 // Exit code 77, which ctest shows as skipped, where NVRTC is missing.
 #include "cuda_nvrtc.h"
 #include "cuda_program.h"
@@ -25,6 +26,8 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <fstream>
+#include <iterator>
 #include <map>
 #include <stdexcept>
 #include <string>
@@ -114,8 +117,16 @@ void addScene(const crt::CompiledScene& scene, const std::string& name, Variants
     for (const KernelSpec& kernel : crt::plugin::planWave(scene.data()).kernels) add(kernel, name, variants);
 }
 
+std::string textOf(const char* path) {
+    std::ifstream file(path);
+    std::string text{std::istreambuf_iterator<char>(file), {}};
+    if (text.empty()) throw std::runtime_error(std::string(path) + " is missing or empty");
+    return text;
+}
+
 int run(int argc, char** argv) {
     int arch = 90, part = 1, parts = 1;
+    std::string precompiled;
     Variants variants;
     for (const auto& [mask, name] : representativeMasks()) addMask(mask, name, variants);
     for (int i = 1; i < argc; ++i) {
@@ -126,6 +137,10 @@ int run(int argc, char** argv) {
         if (std::strcmp(argv[i], "--part") == 0 && i + 2 < argc) {
             part = std::atoi(argv[++i]);
             parts = std::atoi(argv[++i]);
+            continue;
+        }
+        if (std::strcmp(argv[i], "--precompiled") == 0 && i + 1 < argc) {
+            precompiled = textOf(argv[++i]);
             continue;
         }
         if (std::strcmp(argv[i], "--only") == 0) {
@@ -164,10 +179,12 @@ int run(int argc, char** argv) {
         const std::string entry = crt::plugin::entryName(spec.entry);
         const auto start = std::chrono::steady_clock::now();
         // The one with everything in is compiled ahead of time, for three blocks (its CMakeLists.txt).
+        const bool full = spec.features == CRT_FEATURES_ALL;
         const crt::cuda::Cubin cubin =
-            spec.features == CRT_FEATURES_ALL
+            !full ? crt::cuda::compileLean(nvrtc, text, arch, spec)
+            : precompiled.empty()
                 ? nvrtc.compile(text, "kernel/schedule/wavefront.h", crt::cuda::nvrtcOptions(arch, spec, 3))
-                : crt::cuda::compileLean(nvrtc, text, arch, spec);
+                : crt::cuda::Cubin{{}, precompiled};
         const double ms =
             std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
         const crt::cuda::ResourceUse use = crt::cuda::resourceUse(cubin.log, entry);
