@@ -16,7 +16,7 @@ constexpr std::size_t kPart = std::size_t{1} << 16;  // of what a thread takes a
 std::uint32_t acceleratorOf(const Scene& scene, const FlatScene& flat) {
     const std::size_t triangles = flat.triangles.size();
     // Nothing to find; and the view of the boxes looks for no triangle.
-    if (triangles == 0 || scene.integrator.type == IntegratorType::Aabb) return CRT_ACCELERATOR_BRUTE_FORCE;
+    if (triangles == 0 || !tracesSurfaces(scene.integrator.type)) return CRT_ACCELERATOR_BRUTE_FORCE;
     switch (scene.integrator.accelerator) {
         case Accelerator::Bvh: return CRT_ACCELERATOR_BVH;
         case Accelerator::Aabb: return CRT_ACCELERATOR_AABB;

@@ -114,7 +114,7 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
     header.faces = blob.appendFilled<kernel::CrtFace>(
         count, [&](auto faces) { compileFaces(flat, accelerator, faces); });
     std::size_t occluders = 0;
-    const bool shows_boxes = scene.integrator.type == IntegratorType::Aabb;
+    const bool shows_boxes = !tracesSurfaces(scene.integrator.type);
     if (accelerator.kind == CRT_ACCELERATOR_BRUTE_FORCE && !shows_boxes) {
         const std::vector<std::uint32_t> all = trianglesOf(flat);
         const std::vector<std::uint32_t> occluding = shadowRaysLeave(scene) ? all : occludersOf(flat);
@@ -143,7 +143,7 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
     header.tree_lights = lights.tree_lights;
     header.environment_light = lights.environment;
     header.point_lights = blob.append(lights.point_lights);
-    if (lights.lights.empty() && !scene.environment && scene.integrator.type == IntegratorType::Path)
+    if (lights.lights.empty() && !scene.environment && measuresLight(scene.integrator.type))
         logWarning(
             "the scene has no light: the image will be black "
             "(add emission to an object, lights, or an environment)");
@@ -281,7 +281,7 @@ void warnOfNearSurfaces(const Scene& scene, const CompiledScene& compiled) {
 
 CompiledScene compileScene(const Scene& scene, std::uint32_t aovs, const CompileOptions& options) {
     CompiledScene compiled = compileParts(scene, aovs, options);
-    if (scene.integrator.type == IntegratorType::Path) warnOfNearSurfaces(scene, compiled);
+    if (measuresLight(scene.integrator.type)) warnOfNearSurfaces(scene, compiled);
     return compiled;
 }
 

@@ -170,7 +170,7 @@ void growTree(const std::vector<std::optional<LightBounds>>& bounds, LightPart& 
 
 std::vector<std::uint32_t> emittingTriangles(const Scene& scene, const FlatScene& flat) {
     std::vector<std::uint32_t> emitting;
-    if (scene.integrator.type != IntegratorType::Path) return emitting;
+    if (!measuresLight(scene.integrator.type)) return emitting;
     std::vector<bool> shines;
     for (const Emission& emission : scene.emissions) shines.push_back(emission.radiance.max() > 0);
     for (std::size_t i = 0; i < flat.triangles.size(); ++i) {
@@ -286,7 +286,7 @@ bool samplesEnvironment(const Scene& scene) {
 }
 
 const Spectrum* spectrumOfEnvironment(const Scene& scene) {
-    const bool shown = scene.environment && scene.integrator.type == IntegratorType::Path;
+    const bool shown = scene.environment && measuresLight(scene.integrator.type);
     return shown ? &scene.environment->radiance : nullptr;
 }
 

@@ -153,7 +153,7 @@ std::vector<const Material*> usedMaterials(const Scene& scene, const FlatScene& 
             if (used[i] && scene.materials[i].isComposed())
                 for (const std::int32_t part : scene.materials[i].parts)
                     used[static_cast<std::size_t>(part)] = true;
-    const bool scattered = scene.integrator.type == IntegratorType::Path;
+    const bool scattered = measuresLight(scene.integrator.type);
     std::vector<const Material*> materials;
     for (std::size_t i = 0; i < count; ++i)
         materials.push_back(used[i] && scattered ? &scene.materials[i] : nullptr);

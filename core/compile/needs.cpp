@@ -19,10 +19,10 @@ namespace {
 static_assert((0ull CRT_FEATURE_LIST(CRT_FEATURE_SUM)) == CRT_FEATURES_ALL, "two features share a bit");
 #undef CRT_FEATURE_SUM
 
-bool isPath(const Scene& scene) { return scene.integrator.type == IntegratorType::Path; }
+bool isOfLight(const Scene& scene) { return measuresLight(scene.integrator.type); }
 
 /// True if light is ever scattered; if not, materials, light sampling and roulette have nothing to do.
-bool scatters(const Scene& scene) { return isPath(scene) && scene.integrator.max_depth > 0; }
+bool scatters(const Scene& scene) { return isOfLight(scene) && scene.integrator.max_depth > 0; }
 
 }  // namespace
 
@@ -32,14 +32,14 @@ std::uint64_t featuresOf(const Scene& scene, const kernel::CrtScene& header, con
     need(header.sampler == CRT_SAMPLER_SOBOL, CRT_FEATURE_SOBOL);
     need(header.sampler == CRT_SAMPLER_INDEPENDENT, CRT_FEATURE_INDEPENDENT);
     need(header.sampler == CRT_SAMPLER_XORSHIFT, CRT_FEATURE_XORSHIFT);
-    const bool traces = scene.integrator.type != IntegratorType::Aabb;
+    const bool traces = tracesSurfaces(scene.integrator.type);
     need(traces && header.accelerator == CRT_ACCELERATOR_BVH, CRT_FEATURE_BVH);
     need(traces && header.accelerator == CRT_ACCELERATOR_BRUTE_FORCE, CRT_FEATURE_BRUTE_FORCE);
     need(traces && header.accelerator == CRT_ACCELERATOR_AABB, CRT_FEATURE_AABB);
     // Even where nothing is scattered, the albedo of first hits is a material's, and panes are passed.
-    const bool passes_panes = isPath(scene) && (materials.features & CRT_FEATURE_THIN_DIELECTRIC) != 0;
+    const bool passes_panes = isOfLight(scene) && (materials.features & CRT_FEATURE_THIN_DIELECTRIC) != 0;
     if (scatters(scene) || (header.aovs & kAovAlbedo) != 0 || passes_panes) f |= materials.features;
-    need(isPath(scene), materials.features & (CRT_FEATURE_MEDIA | CRT_FEATURE_OPACITY));
+    need(isOfLight(scene), materials.features & (CRT_FEATURE_MEDIA | CRT_FEATURE_OPACITY));
     need(traces && header.normals.count > 0, CRT_FEATURE_SMOOTH_NORMALS);
     need(traces && header.shapes.count > 0, CRT_FEATURE_SHAPES);
     need(traces && header.instances.count > 0, CRT_FEATURE_INSTANCES);
@@ -62,7 +62,7 @@ std::uint64_t featuresOf(const Scene& scene, const kernel::CrtScene& header, con
     need(header.textures.count > 0, CRT_FEATURE_TEXTURE);
     need(header.camera.lens_radius > 0, CRT_FEATURE_LENS);
     need(header.filter.count > 0, CRT_FEATURE_FILTER);
-    need(!isPath(scene), CRT_FEATURE_VIEW);
+    f |= rowOf(scene.integrator.type).features;
     need((header.aovs & kAovsOfFirstHits) != 0, CRT_FEATURE_AOV);
     need((header.aovs & kAovReplicates) != 0, CRT_FEATURE_REPLICATES);
     need(header.spectral_film.count > 0, CRT_FEATURE_SPECTRAL_FILM);
@@ -129,9 +129,9 @@ LeftOut leftOut(const Scene& scene, const kernel::CrtScene& header, std::size_t 
     if (!has(CRT_FEATURE_FILTER)) left_out("pixel filter table", "the box filter is the pixel itself");
     if (!has(CRT_FEATURE_AOV)) left_out("AOV buffers", "no output asks for first-hit AOVs");
     if (!has(CRT_FEATURE_REPLICATES))
-        left_out("replicates", !isPath(scene) ? "integrator.type is a view" : "sampler.replicates is 1");
+        left_out("replicates", !isOfLight(scene) ? "integrator.type is a view" : "sampler.replicates is 1");
     if (!has(CRT_FEATURE_SPECTRAL_FILM))
-        left_out("spectral film", !isPath(scene) ? "integrator.type is a view"
+        left_out("spectral film", !isOfLight(scene) ? "integrator.type is a view"
                                                  : "the film has neither bins nor responses");
     if (!has(CRT_FEATURE_VIEW)) left_out("normals and bounding-box views", "integrator.type is path");
     for (const auto& [feature, name] : {std::pair{CRT_FEATURE_SOBOL, "Sobol sampler"},

@@ -64,7 +64,7 @@ bool emits(const Scene& scene, const Object& object) {
 }
 
 bool sharesMesh(const Scene& scene, const Object& object) {
-    const bool traced = scene.integrator.type != IntegratorType::Aabb &&
+    const bool traced = tracesSurfaces(scene.integrator.type) &&
                         (scene.integrator.accelerator == Accelerator::Auto ||
                          scene.integrator.accelerator == Accelerator::Bvh);
     const std::size_t triangles = scene.meshes[object.mesh].triangles.size();

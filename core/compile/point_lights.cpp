@@ -71,7 +71,7 @@ kernel::CrtLightForm formOf(const PointLight& light, const FlatScene& flat, Blob
 
 std::vector<const PointLight*> shiningPointLights(const Scene& scene) {
     std::vector<const PointLight*> shining;
-    if (scene.integrator.type != IntegratorType::Path) return shining;
+    if (!measuresLight(scene.integrator.type)) return shining;
     for (const bool suns : {true, false})
         for (const PointLight& light : scene.point_lights)
             if ((light.type == PointLightType::Sun) == suns && light.strength * light.spectrum.max() > 0)

@@ -103,13 +103,9 @@ kernel::CrtCamera cameraOf(const Scene& scene, const Vec3d& centre, int scale_ex
     return c;
 }
 
-/// View, sampler, seed, depths, light sampling.
+/// Integrator, sampler, seed, depths, light sampling.
 void setIntegrator(const Scene& scene, kernel::CrtScene& header) {
-    switch (scene.integrator.type) {
-        case IntegratorType::Path: header.view = CRT_VIEW_PATH; break;
-        case IntegratorType::Normals: header.view = CRT_VIEW_NORMALS; break;
-        case IntegratorType::Aabb: header.view = CRT_VIEW_AABB; break;
-    }
+    header.integrator = static_cast<std::uint32_t>(scene.integrator.type);
     switch (scene.sampler.type) {
         case SamplerType::Sobol: header.sampler = CRT_SAMPLER_SOBOL; break;
         case SamplerType::Independent: header.sampler = CRT_SAMPLER_INDEPENDENT; break;

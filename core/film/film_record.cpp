@@ -107,10 +107,6 @@ std::string filterText(const FilmSettings& film) {
 }
 
 constexpr const char* kIntegratorTrait = "the integrator";
-
-const char* integratorText(IntegratorType type) {
-    return type == IntegratorType::Path ? "path" : type == IntegratorType::Normals ? "normals" : "aabb";
-}
 const char* samplerText(SamplerType type) {
     return type == SamplerType::Sobol         ? "sobol"
            : type == SamplerType::Independent ? "independent"
@@ -306,7 +302,7 @@ std::vector<SceneTrait> traitsOf(const Scene& scene, std::uint32_t aovs) {
             {"the seed", std::to_string(scene.sampler.seed), {}},
             {"the sampler", samplerText(scene.sampler.type), {}},
             {"the replicates", std::to_string(replicatesOf(scene)), {}},
-            {kIntegratorTrait, integratorText(i.type), {}},
+            {kIntegratorTrait, rowOf(i.type).word, {}},
             {"max_depth", std::to_string(i.max_depth), {}},
             {"roulette", i.roulette ? fmt::format("on from depth {}", i.roulette_depth) : "off", {}},
             {"nee", onOff(i.nee), {}},
@@ -528,7 +524,7 @@ std::vector<std::string> differingTraits(const FilmRecord& found, const FilmReco
 
 bool FilmRecord::holdsRadiance() const {
     return std::any_of(traits.begin(), traits.end(), [](const SceneTrait& trait) {
-        return trait.name == kIntegratorTrait && trait.text == integratorText(IntegratorType::Path);
+        return trait.name == kIntegratorTrait && trait.text == rowOf(IntegratorType::Path).word;
     });
 }
 

@@ -250,7 +250,7 @@ std::optional<double> SurfacePoints::brightest(std::vector<LitPath> paths, std::
 
 BrightestPath brightestPathOf(const CompiledScene& scene) {
     const CrtScene& header = scene.header();
-    if (header.view != CRT_VIEW_PATH || header.lights.count == 0) return {};
+    if (header.integrator != CRT_INTEGRATOR_PATH || header.lights.count == 0) return {};
     const SurfacePoints points(scene);
     std::vector<LitPath> mirrored, from_anywhere;
     const std::vector<CrtHit> hits = points.choose();

@@ -227,7 +227,7 @@ int runJob(const Job& job, Watch& watch) {
 
     // The scene and its outputs.
     Scene scene = loadScene(job.scene);
-    if (job.expose_automatically && scene.integrator.type != IntegratorType::Path)
+    if (job.expose_automatically && !measuresLight(scene.integrator.type))
         throw Error(ErrorKind::Usage, "--expose auto needs integrator.type path: the other types do not "
                                       "show light");
     if (job.target_error > 0) requireReplicates(scene);

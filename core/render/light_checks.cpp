@@ -157,7 +157,7 @@ std::vector<std::string> reasonsForBlack(const Scene& scene) {
 
 std::vector<std::string> idleLamps(const Scene& scene) {
     std::vector<std::string> idle;
-    if (scene.integrator.type != IntegratorType::Path) return idle;
+    if (!measuresLight(scene.integrator.type)) return idle;
     Front front(scene);
     if (front.tooManyPoints()) return idle;
     for (const Object& object : scene.objects) {
@@ -206,7 +206,7 @@ bool isBlack(const Film& film) {
 void warnOfLargeUnits(const Film& film, const Scene& scene) {
     constexpr double kBlack = 1.5e-4;  // 8 bits of sRGB show less as 0.
     constexpr double kFar = 30;        // In metres: rooms and stages are smaller.
-    if (scene.integrator.type != IntegratorType::Path || scene.metres_per_unit || film.samples.count() == 0)
+    if (!measuresLight(scene.integrator.type) || scene.metres_per_unit || film.samples.count() == 0)
         return;
     const PointLight* nearest = nullptr;
     double distance = std::numeric_limits<double>::infinity();
@@ -225,7 +225,7 @@ void warnOfLargeUnits(const Film& film, const Scene& scene) {
 }
 
 void warnOfBlackFilm(const Film& film, const Scene& scene) {
-    if (scene.integrator.type != IntegratorType::Path || film.samples.count() == 0 || !isBlack(film)) return;
+    if (!measuresLight(scene.integrator.type) || film.samples.count() == 0 || !isBlack(film)) return;
     logWarning("the image is black: no path met a light; {}", fmt::join(reasonsForBlack(scene), "; "));
 }
 

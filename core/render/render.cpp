@@ -96,7 +96,7 @@ void judge(const Film& film, const Scene& scene, RunFacts& facts) {
 
 void requireReplicates(Scene& scene) {
     if (replicatesOf(scene) > 1) return;
-    if (scene.integrator.type != IntegratorType::Path)
+    if (!measuresLight(scene.integrator.type))
         throw Error(ErrorKind::Usage, "--target-error needs integrator.type path: the other types have no "
                                       "noise");
     if (scene.sampler.type == SamplerType::Sobol)

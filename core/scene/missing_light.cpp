@@ -89,7 +89,7 @@ std::vector<const PointLight*> lightsWithoutSize(const Scene& scene) {
 std::vector<std::string> missingLight(const Scene& scene) {
     std::vector<std::string> missing;
     // With a depth of 0 the scene shows no illuminated surfaces.
-    if (scene.integrator.type != IntegratorType::Path || scene.integrator.max_depth == 0) return missing;
+    if (!measuresLight(scene.integrator.type) || scene.integrator.max_depth == 0) return missing;
     const SingleDirections found = singleDirectionsOf(scene);
     if (const std::vector<const PointLight*> lights = lightsWithoutSize(scene); !lights.empty()) {
         const std::string of = fmt::format("light of {} lights", kindsOf(lights));

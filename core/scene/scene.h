@@ -9,6 +9,7 @@
 #include "kernel/dialect/features.h"
 #include "scene/aov.h"
 #include "scene/ies_file.h"
+#include "scene/integrator_type.h"
 #include "scene/spectral_film.h"
 #include "scene/texture.h"
 #include "spectra/spectra.h"
@@ -68,7 +69,6 @@ struct FilmSettings {
     SpectralFilm spectral;                  ///< Beside X, Y and Z.
 };
 
-enum class IntegratorType { Path, Normals, Aabb };
 enum class Accelerator { Auto, Bvh, Aabb, None };
 
 struct IntegratorSettings {
@@ -341,7 +341,7 @@ struct Scene {
 /// The channels of its film beside those of kernel/dialect/channels.h. Views show no spectrum.
 inline SpectralChannels spectralChannelsOf(const Scene& scene) {
     SpectralChannels channels;
-    if (scene.integrator.type != IntegratorType::Path) return channels;
+    if (!measuresLight(scene.integrator.type)) return channels;
     channels.bins = scene.film.spectral.bins;
     for (const SensorResponse& response : scene.film.spectral.responses)
         channels.responses.push_back(response.name);
@@ -374,7 +374,7 @@ inline std::int32_t emissionIndexOf(const Scene& scene, const Object& object, st
 /// since the pixels of a film add theirs up and every further sequence costs noise. By the whole film, so
 /// that the crop window of an image has its bits.
 inline int replicatesOf(const Scene& scene) {
-    if (scene.integrator.type != IntegratorType::Path) return 1;
+    if (!measuresLight(scene.integrator.type)) return 1;
     if (scene.sampler.replicates != 0) return scene.sampler.replicates;
     constexpr std::int64_t kDegreesOfFreedom = 1000, kMost = 16;
     const std::int64_t pixels = std::int64_t{scene.film.width} * scene.film.height;

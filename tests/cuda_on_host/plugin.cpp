@@ -91,7 +91,7 @@ private:
 
     /// A view is no path.
     bool hasWaves() const {
-        return reinterpret_cast<const kernel::CrtScene*>(blob_.data())->view == CRT_VIEW_PATH;
+        return reinterpret_cast<const kernel::CrtScene*>(blob_.data())->integrator == CRT_INTEGRATOR_PATH;
     }
 
     struct alignas(64) Line {

@@ -193,7 +193,7 @@ private:
             static_cast<std::size_t>(std::count(references_.begin(), references_.end(), nullptr));
         const std::string backend = missing > 0 ? runnableBackend() : std::string();
         for (std::size_t s = 0; s < scenes_.size() && !backend.empty(); ++s) {
-            if (references_[s] || scenes_[s].integrator.type != IntegratorType::Path) continue;
+            if (references_[s] || !measuresLight(scenes_[s].integrator.type)) continue;
             ReferenceRequest request;
             request.backend = backend;
             request.integrator = request_.integrator;

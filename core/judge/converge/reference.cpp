@@ -243,7 +243,7 @@ Image referenceImage(const RenderedFolds& folds, const Scene& scene) {
 }  // namespace
 
 std::optional<MadeReference> renderReference(Scene scene, const ReferenceRequest& request, Watch& watch) {
-    if (scene.integrator.type != IntegratorType::Path)
+    if (!measuresLight(scene.integrator.type))
         throw Error(ErrorKind::Usage,
                     "a view has no noise and needs no reference: integrator.type must be path");
     if (std::filesystem::path(request.output).extension() != ".exr")

@@ -15,6 +15,7 @@
 #include "kernel/dialect/channels.h"
 #include "kernel/dialect/dialect.h"
 #include "kernel/dialect/features.h"
+#include "kernel/dialect/integrators.h"
 
 CRT_KERNEL_BEGIN
 
@@ -442,10 +443,6 @@ CRT_ASSERT_SIZE(CrtCamera, 96);
 #define CRT_NEE_MIS 1u
 #define CRT_NEE_ONLY 2u
 
-#define CRT_VIEW_PATH 0u
-#define CRT_VIEW_NORMALS 1u
-#define CRT_VIEW_AABB 2u
-
 #define CRT_ACCELERATOR_BRUTE_FORCE 0u
 #define CRT_ACCELERATOR_BVH 1u
 #define CRT_ACCELERATOR_AABB 2u
@@ -466,7 +463,7 @@ typedef struct CrtScene {
     u32 magic;
     u32 environment_light; /* 1 + the index of its CrtLight; 0: light sampling leaves it to scattered rays */
     u64 features;          /* of the scene; the kernel has at least these */
-    u32 view;
+    u32 integrator; /* CRT_INTEGRATOR_… */
     u32 accelerator;
 
     u32 width, height;           /* of the crop window: what the film holds */

@@ -28,9 +28,9 @@ CRT_FN void crt_resolve_shadow(const CrtContext *ctx, CrtPath *path, const CrtSh
     if (!blocked) path->radiance = path->radiance + shadow->radiance;
 }
 
-/* crt_path_vertex where rays may pass surfaces. One loop traces the path's ray, then the shadow ray: both go
+/* crt_path_advance where rays may pass surfaces. One loop traces the path's ray, then the shadow ray: both go
    on until something stops them. */
-CRT_FN int crt_path_vertex_passing(const CrtContext *ctx, CrtPath *path, CrtRayCount *rays) {
+CRT_FN int crt_path_advance_passing(const CrtContext *ctx, CrtPath *path, CrtRayCount *rays) {
     CrtShadow shadow;
     CrtRay ray = path->ray;
     int alive = 0;
@@ -89,13 +89,17 @@ CRT_FN int crt_path_vertex_passing(const CrtContext *ctx, CrtPath *path, CrtRayC
 
 /* Traces the path's ray to its next vertex, shades it and resolves its shadow ray. Returns 0 when the path
    has ended. */
-CRT_FN int crt_path_vertex(const CrtContext *ctx, CrtPath *path, CrtRayCount *rays) {
-    if (CRT_HAS(OPACITY) || CRT_HAS(THIN_DIELECTRIC)) return crt_path_vertex_passing(ctx, path, rays);
+CRT_FN int crt_path_advance(const CrtContext *ctx, CrtPath *path, CrtRayCount *rays) {
+    if (CRT_HAS(OPACITY) || CRT_HAS(THIN_DIELECTRIC)) return crt_path_advance_passing(ctx, path, rays);
     CrtShadow shadow;
     rays->closest += 1u;
     const int alive = crt_shade(ctx, path, crt_trace_closest(ctx, path->ray), &shadow);
     if (CRT_HAS(NEE) && shadow.pending) crt_resolve_shadow(ctx, path, &shadow, rays);
     return alive;
+}
+
+CRT_FN vec4 crt_path_end(const CrtContext *ctx, const CrtPath *path) {
+    return crt_to_xyz(ctx, path->wavelengths, path->radiance);
 }
 
 CRT_KERNEL_END

@@ -6,8 +6,7 @@
 #define CRT_PIXEL_H
 
 #include "kernel/film/film.h"
-#include "kernel/integrators/path.h"
-#include "kernel/integrators/views.h"
+#include "kernel/integrators/integrator.h"
 
 CRT_KERNEL_BEGIN
 
@@ -34,7 +33,8 @@ CRT_FN CrtPixelWork crt_pixel_begin(const CrtContext *ctx, u32 x, u32 y, u64 fir
 }
 
 /* Adds the sample whose path has ended. */
-CRT_FN void crt_add_sample(const CrtContext *ctx, CrtPixelWork *work, vec4 xyz) {
+CRT_FN void crt_add_sample(const CrtContext *ctx, CrtPixelWork *work) {
+    const vec4 xyz = crt_integrator_end(ctx, &work->path);
     crt_film_add_sample(ctx, &work->film, xyz, work->path.radiance, work->path.wavelengths,
                         &work->path.first);
 }
@@ -49,15 +49,8 @@ CRT_FN void crt_begin_sample(const CrtContext *ctx, CrtPixelWork *work) {
 CRT_FN int crt_pixel_vertex(const CrtContext *ctx, CrtPixelWork *work, CrtRayCount *rays) {
     if (work->film.done >= work->sample_count) return 0;
     if (!work->alive) crt_begin_sample(ctx, work);
-    vec4 xyz = splat4(0.0f);
-    if (CRT_HAS(VIEW) && ctx->scene->view != CRT_VIEW_PATH) {
-        xyz = crt_view(ctx, &work->path, rays);
-    } else {
-        work->alive = crt_path_vertex(ctx, &work->path, rays);
-        if (work->alive) return 1;
-        xyz = crt_to_xyz(ctx, work->path.wavelengths, work->path.radiance);
-    }
-    crt_add_sample(ctx, work, xyz);
+    work->alive = crt_integrator_advance(ctx, &work->path, rays);
+    if (!work->alive) crt_add_sample(ctx, work);
     return 1;
 }
 
@@ -76,8 +69,8 @@ CRT_FN void crt_render_pixel(const CrtContext *ctx, u32 x, u32 y, u64 first_samp
     if (waits) {
         while (work.film.done < work.sample_count) {
             crt_begin_sample(ctx, &work);
-            while (crt_path_vertex(ctx, &work.path, rays)) continue;
-            crt_add_sample(ctx, &work, crt_to_xyz(ctx, work.path.wavelengths, work.path.radiance));
+            while (crt_integrator_advance(ctx, &work.path, rays)) continue;
+            crt_add_sample(ctx, &work);
         }
     } else {
         while (crt_pixel_vertex(ctx, &work, rays)) continue;

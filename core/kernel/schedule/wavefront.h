@@ -19,7 +19,7 @@ CRT_FN void crt_wave_add(const CrtContext *ctx, const CrtWave *wave, u32 slot, C
     path->radiance = *crt_row(wave, CRT_ROW_RADIANCE, slot);
     path->wavelengths = crt_load_wavelengths(wave, slot);
     if (crt_wave_has_first_hit(ctx)) crt_load_first_hit(wave, slot, path);
-    crt_add_sample(ctx, work, crt_to_xyz(ctx, path->wavelengths, path->radiance));
+    crt_add_sample(ctx, work);
 }
 
 /* Adds the sample that has ended, unless this is the first pass, and begins the slot's next one. Returns 0

@@ -340,7 +340,7 @@ SectionSchema filter() {
 
 SectionSchema integrator() {
     const IntegratorSettings d;
-    const std::vector<std::string> types{"path", "normals", "aabb"};
+    const std::vector<std::string> types = integratorWords();
     const std::vector<std::string> accelerators{"auto", "bvh", "aabb", "none"};
     return {"integrator",
             "integrator",

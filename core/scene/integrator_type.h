@@ -1,0 +1,47 @@
+/// The integrators of kernel/dialect/integrators.h, as scenes name them and as the rest of core asks for
+/// them. An integrator that a row adds is known here by its columns alone.
+#pragma once
+
+#include "kernel/dialect/features.h"
+#include "kernel/dialect/integrators.h"
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace crt {
+
+#define CRT_INTEGRATOR_TYPE(number, NAME, Name, word, stem, KERNELS, light, surfaces) Name = number,
+enum class IntegratorType : std::uint32_t { CRT_INTEGRATOR_LIST(CRT_INTEGRATOR_TYPE) };
+#undef CRT_INTEGRATOR_TYPE
+
+struct IntegratorRow {
+    const char* word = "";        ///< In scene files.
+    std::uint64_t features = 0;   ///< Of kernels that have it, beside those of the scene.
+    bool measures_light = false;  ///< If not, its image is of colours.
+    bool traces_surfaces = false; ///< If not, it needs the objects' boxes alone.
+};
+
+inline IntegratorRow rowOf(IntegratorType type) {
+    constexpr std::uint64_t CRT_FEATURE_ALL = 0;  // what every kernel has
+    switch (type) {
+#define CRT_INTEGRATOR_ROW(number, NAME, Name, word, stem, KERNELS, light, surfaces) \
+    case IntegratorType::Name: return {word, CRT_FEATURE_##KERNELS, light != 0, surfaces != 0};
+        CRT_INTEGRATOR_LIST(CRT_INTEGRATOR_ROW)
+#undef CRT_INTEGRATOR_ROW
+    }
+    return {};
+}
+
+inline bool measuresLight(IntegratorType type) { return rowOf(type).measures_light; }
+inline bool tracesSurfaces(IntegratorType type) { return rowOf(type).traces_surfaces; }
+
+/// The words of all, by their numbers.
+inline std::vector<std::string> integratorWords() {
+    std::vector<std::string> words;
+    for (std::uint32_t i = 0; *rowOf(static_cast<IntegratorType>(i)).word != '\0'; ++i)
+        words.emplace_back(rowOf(static_cast<IntegratorType>(i)).word);
+    return words;
+}
+
+}  // namespace crt
