@@ -10,7 +10,7 @@
 
 CRT_KERNEL_BEGIN
 
-/* What the first surface that a path meets gives to AOVs. */
+/* The AOVs of the first surface that a path meets. */
 typedef struct CrtFirstHit {
     vec4 albedo; /* at the path's wavelengths */
     vec3 normal;

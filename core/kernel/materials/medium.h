@@ -83,7 +83,7 @@ CRT_FN u32 crt_medium_before(const CrtContext *ctx, const CrtSurface *surface, v
                                                                  : crt_first_medium(ctx, media);
 }
 
-/* Whether the surface of another body coincides with it. */
+/* True if the surface of another body coincides with the hit surface. */
 CRT_FN int crt_touches(const CrtContext *ctx, CrtHit hit) {
     const u32 primitive = crt_primitive_of(ctx, hit);
     return (CRT_ARRAY(CrtPrimitive, ctx->blob, ctx->scene->primitives)[primitive].object &

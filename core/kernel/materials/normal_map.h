@@ -1,14 +1,14 @@
 /*
  * normal_map.h: normals from an image, in the tangent space of the texture's coordinates.
  *
- * A mapped normal that is merely put in place of the surface's own loses light: what the BSDF about it sends
- * below the surface, and all that it would send towards a viewer behind it. Here it is, as in Schüßler et
- * al. (2017, "Microfacet-based Normal Mapping for Robust Monte Carlo Path Tracing"), the normal of a facet
- * beside which stands a wall, a mirror upright on the surface: a viewer behind it sees it in the wall. What
- * leaves the facet downwards is mirrored up by the surface: by its interpolated normal, where it has one,
- * and then by its geometric one, as is what other smooth surfaces send down (shading_normal.h). So of light
- * from everywhere a surface sends on what its BSDF does. Why there is no shadowing by the walls:
- * docs/decisions/0024-normal-maps.md.
+ * A mapped normal that is merely put in place of the surface's own loses light: what the BSDF about it
+ * sends below the surface, and all that it would send towards a viewer behind it. Here it is, as in
+ * Schüßler et al. (2017, "Microfacet-based Normal Mapping for Robust Monte Carlo Path Tracing"), the
+ * normal of a facet beside which stands a wall, a mirror upright on the surface: a viewer behind it sees it
+ * in the wall. The surface mirrors up light that leaves the facet downwards: by its interpolated normal,
+ * where it has one, and then by its geometric one, as other smooth surfaces do (shading_normal.h). So in
+ * uniform light a surface reflects as much as its BSDF. docs/decisions/0024-normal-maps.md says why the
+ * walls cast no shadow.
  *
  * Surfaces that transmit have no walls: there the mapped normal stands in the place of the other, and what
  * would leave to the wrong side is mirrored by the face (crt_to_its_side).
@@ -94,13 +94,14 @@ CRT_FN f32 crt_scatter_cosine(const CrtBsdf *b, vec3 wi) {
     return above > 0.0f ? -above : cosine;
 }
 
-/* Whether the base of a facet is off its side: an interpolated normal. */
+/* True if the base of a facet differs from its side: the surface has an interpolated normal. */
 CRT_FN int crt_is_tilted(const CrtBsdf *b) {
     const vec3 off = b->base - b->side;
     return dot3(off, off) > 0.0f;
 }
 
-/* How many directions of a facet end in wi: that itself, and the one that the surface mirrors into it. */
+/* The number of a facet's directions that end in wi: wi itself, and the one that the surface mirrors into
+   it. */
 CRT_FN u32 crt_ways(const CrtBsdf *b, vec3 wi) {
     if (!b->facet) return 1u;
     return dot3(wi, b->base) > 0.0f ? 2u : 0u;

@@ -139,7 +139,7 @@ CRT_FN vec4 crt_dielectric_reflectance(const CrtBsdf *b, f32 cos_i) {
     return crt_fresnel_dielectric4(cos_i, b->eta);
 }
 
-/* Whether what a dielectric reflects depends on the wavelength. */
+/* True if the reflectance of a dielectric depends on the wavelength. */
 CRT_FN int crt_is_divided(const CrtBsdf *b) {
     return (CRT_HAS(DISPERSION) && (b->flags & CRT_BSDF_DISPERSIVE) != 0u) || crt_has_film(b);
 }
