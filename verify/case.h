@@ -50,9 +50,9 @@ class Context;
 struct Case {
     std::string id;         ///< Group and number: "A03".
     std::string name;       ///< For the command line: "square-light". Unique, too.
-    std::string title;      ///< What is asked.
+    std::string title;      ///< The question.
     std::string expected;   ///< The answer, in words or as a formula.
-    std::string source;     ///< Where the answer comes from.
+    std::string source;     ///< The origin of the answer.
     std::string tolerance;  ///< As in the outcomes.
     Level level = Level::Commit;
     std::uint64_t needs = 0;  ///< Features (dialect/features.h) that a backend must have for this case.
@@ -87,7 +87,7 @@ const std::vector<Case>& registry();
 /// one by one. Throws crt::Error(Usage) for a word that names nothing.
 std::vector<const Case*> select(const std::vector<std::string>& words, Level level);
 
-/// Groups, each in a file of its own.
+/// Groups, each in a separate file.
 std::vector<Case> closedFormCases();     ///< A
 std::vector<Case> glassCases();          ///< A, the part about smooth interfaces
 std::vector<Case> scaleCases();          ///< B
@@ -117,7 +117,7 @@ std::vector<Case> colourCases();         ///< H
 std::vector<Case> textureCases();        ///< H, the part about textures
 std::vector<Case> accumulationCases();   ///< I
 std::vector<Case> cameraCases();         ///< J: lens and filter
-std::vector<Case> firstHitCases();       ///< D, J: what is told of first hits
+std::vector<Case> firstHitCases();       ///< D, J: the outputs of first hits
 std::vector<Case> imageCases();          ///< J
 std::vector<Case> backendCases();        ///< L
 std::vector<Case> exactRelationCases();  ///< M01 to M19

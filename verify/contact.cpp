@@ -122,7 +122,7 @@ std::string contactScene(const std::vector<Vec3d>& lamp, bool two_sided, std::si
         .yaml();
 }
 
-/// What is asked at one distance.
+/// The question at one distance.
 struct Question {
     std::string where;
     Lamp lamp;
@@ -130,7 +130,7 @@ struct Question {
     double tolerance = 0.005;
 };
 
-/// Whether chance finds enough of the lamp to tell anything.
+/// True if scattered rays find the lamp often enough for an answer.
 bool foundByChance(double form_factor) { return form_factor > 0.05; }
 
 /// The answer for one shape of the lamp, in one order of its vertices and one frame.

@@ -144,7 +144,8 @@ void duplicates(Context& context) {
 
 void coplanar(Context& context) {
     for (const int ulps : {0, 1, 4, 32}) {
-        // Two squares of different radiance, the second nearer by so many ulps of a coordinate in [½, 1).
+        // Two squares of different radiance, the second nearer by this number of ulps of a coordinate in
+        // [½, 1).
         Scene scene = emptyScene(64, 1, {0.1, 0.2, -1}, {0, 0, 0.6}, 0.2);
         scene.integrator.max_depth = 0;
         for (const int k : {0, 1}) {

@@ -24,7 +24,7 @@ std::string under(const Lacquer& coat, const std::string& base, double weight = 
                        base, weight, coat.color, coat.roughness, coat.ior, coat.darkening);
 }
 
-/// What the specification says of a metal's or a gloss's roughness under a rough coat.
+/// The roughness of a metal or a gloss under a rough coat, by the specification.
 double widened(double base, double coat) {
     return std::pow(std::min(1.0, std::pow(base, 4) + 2 * std::pow(coat, 4)), 0.25);
 }
@@ -125,7 +125,7 @@ void skies(Context& context) {
                  under(coat, fmt::format("base_color: 0.5, specular_roughness: 0, specular_ior: {}", ior)),
                  degrees, with(below + 0.5 * (1 - below)));
         }
-        // In part: so much of the surface is bare.
+        // A coat on part of the surface: the rest is bare.
         const Lacquer clear{.roughness = 0.5};
         seen("a quarter of a coat", under(clear, "base_color: 0.5, specular_weight: 0", 0.25), degrees,
              0.75 * 0.5 + 0.25 * clear.albedo(cosine, 0.5));

@@ -75,8 +75,7 @@ std::string roughMetal(double n, double k, double roughness) {
     return fmt::format("{{type: rough_conductor, eta: {:g}, k: {:g}, roughness: {:g}}}", n, k, roughness);
 }
 
-/// Where microfacets are sharpest their distribution has the fewest digits: GGX's width is 1e-3 at the
-/// least.
+/// The distribution of the sharpest microfacets has the fewest digits: GGX's width is 1e-3 at the least.
 void roughPeak(Context& context) {
     const Vec3d view = unit({0.4, 0.2, 0.7});
     for (const double roughness : {0.032, 0.04, 0.06, 0.1}) {
@@ -115,7 +114,7 @@ void roughLimit(Context& context) {
                 rough ? roughConductorAlbedo(cosine, 0.2, 3, roughness) : fresnelConductor(cosine, 0.2, 3),
                 2e-3);
             if (roughness != 0.032 && roughness != 0.02 && !context.atLeast(Level::Merge)) continue;
-            // What glass over black sends back.
+            // The light that glass over black sends back.
             const std::string glass =
                 Stage(eyeAt({std::sin(degrees * kDegree), cosine, 0}, "[0, 0, 1]"), kDirect)
                     .material("it",
