@@ -1,5 +1,5 @@
-// Group G, the part about surfaces that are rougher one way than the other: they lose no light, and their
-// highlights lie where the tangent says.
+// Group G, the part about surfaces that are rougher in one direction than in the other: they lose no light,
+// and the tangent places their highlights.
 #include "verify/context.h"
 #include "verify/references.h"
 #include "verify/scenes.h"

@@ -1,4 +1,4 @@
-// Group G, the part about bodies of glass: what is inside what, and holes in their surface.
+// Group G, the part about bodies of glass: bodies inside others, and holes in their surface.
 #include "base/vec3d.h"
 #include "verify/context.h"
 #include "verify/references.h"

@@ -1,4 +1,4 @@
-// Group J, the part about where a pixel's rays begin and what they pass: the lens, and the pixel filter.
+// Group J, the part about the lens and the pixel filter.
 #include "verify/context.h"
 #include "verify/references.h"
 #include "verify/scenes.h"

@@ -175,7 +175,7 @@ void randomTriangles(Context& context) {
         std::vector<Vec3d> corners;
         for (int v = 0; v < 3; ++v) corners.push_back({sideways(random), upward(random), sideways(random)});
         const double expected = polygonFormFactor({0, 0, 0}, {0, 1, 0}, corners);
-        // Not between eye and receiver, and not so thin a sliver that it says nothing.
+        // Not between eye and receiver, and no sliver that is too thin to test anything.
         const double off =
             std::min({std::abs(corners[0][1]), std::abs(corners[1][1]), std::abs(corners[2][1])});
         if (expected < 0.01 || off < 0.05 || distanceToPlane({0, 0, 0}, {0.02, 0.05, 0}, corners) < 0.05)

@@ -15,7 +15,7 @@
 namespace crt::verify {
 namespace {
 
-/// n of the glass in these cases, unless they say otherwise.
+/// n of the glass in these cases, unless a case sets another.
 constexpr double kIndex = 1.5;
 constexpr std::uint64_t kGlass = CRT_FEATURE_DIELECTRIC | CRT_FEATURE_ENVIRONMENT;
 

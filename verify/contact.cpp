@@ -180,8 +180,7 @@ std::vector<double> distances(const Context& context) {
     return {0x1p-3, 0x1p-7, 0x1p-10, 0x1p-12, 0x1p-14, 0x1p-17};
 }
 
-/// A receiver as small as single precision needs to place its points to 1e-6 of the distance that is asked
-/// about.
+/// A receiver as small as single precision needs to place its points to 1e-6 of the distance in question.
 Receiver smallReceiver(const Vec3d& point, const Vec3d& normal, double distance) {
     return {point, normal, 8 * distance, 16 * distance};
 }
@@ -243,8 +242,8 @@ void nearlyCoplanar(Context& context) {
 }
 
 void grazing(Context& context) {
-    // Past the end of a lamp that stands on the floor, hardly off its plane: what is seen of it is as thin
-    // as the distance.
+    // Past the end of a lamp that stands on the floor, hardly off its plane: the visible part of the lamp
+    // is as thin as the distance.
     const Lamp lamp{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, true};
     for (const double d : distances(context))
         for (const double gap : {0.0, 0.5})

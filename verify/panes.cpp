@@ -68,7 +68,7 @@ void lightsBehindPanes(Context& context) {
                                   {std::pow((1 - r) / (1 + r), panes), "polarisation is lost in a pane"}});
             }
     }
-    // Every way of finding surfaces finds all panes of every form, and what is among them.
+    // Every way of finding surfaces finds all panes of every form, and the surfaces among them.
     const std::string sun = "[{type: directional, direction: [0, -1, 0], irradiance: 1}]";
     const std::string sphere =
                           "{sphere: {radius: 0.1}, transform: [{translate: [0, 0.6, 0]}], material: it}",

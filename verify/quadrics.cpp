@@ -76,7 +76,7 @@ const std::string& biconvexObjects() {
 }
 const std::string kBall = "[{material: it, sphere: {radius: 1}}]";
 
-/// Seen from the axis, at −z, a sun on the axis behind the lens fills a disk whose size tells the focal
+/// Seen from the axis, at −z, a sun on the axis behind the lens fills a disk whose size gives the focal
 /// length: a ray at the angle u leaves at u (1 − s/f), s from the lens.
 struct Sighting {
     double distance;    ///< Of the camera.

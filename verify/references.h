@@ -90,8 +90,8 @@ double plasticAlbedo(double cosine, double base, double eta, double roughness);
 /// Of diffuse light from below, the share that such a coat sends back.
 double internalReflectance(double eta, double roughness);
 
-/// The coat of OpenPBR Surface 1.1, by the formulas of its section on coats, on a base that is said to be
-/// so rough.
+/// The coat of OpenPBR Surface 1.1, by the formulas of its section on coats, on a base of the given
+/// roughness.
 struct Lacquer {
     double ior = 1.6, roughness = 0, color = 1, darkening = 1, base_roughness = 1;
 

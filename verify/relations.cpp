@@ -1,4 +1,4 @@
-// Group M: relations between images. Those that hold exactly, M01 to M19, ask for the same bits and cost
+// Group M: relations between images. Those that hold exactly, M01 to M19, require the same bits and cost
 // little; they need no reference.
 #include "verify/context.h"
 #include "verify/shapes.h"

@@ -35,7 +35,8 @@ void roughFurnace(Context& context) {
                                     {squared, "the width of GGX is the roughness, not its square"}};
     };
     const Render how{.samples = 1u << 12};
-    // Of a perfect metal nothing is lost; of another, what Fresnel's equations say of one and more rounds.
+    // A perfect metal loses nothing; other metals lose what Fresnel's equations give for one and more
+    // rounds.
     for (const auto& [n, k] : {std::pair{1.0, 1e6}, std::pair{0.2, 3.0}})
         for (const double roughness : {0.0, 0.1, 0.3, 0.5, 0.7, 1.0})
             for (const double degrees : {0.0, 60.0, 85.0, 89.0}) {

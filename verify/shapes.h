@@ -1,5 +1,5 @@
-/// Geometry and scenes for the verification cases, made in memory: what they are must not depend on a file
-/// or on a reader.
+/// Geometry and scenes for the verification cases, made in memory: they must not depend on a file or on a
+/// reader.
 #pragma once
 
 #include "base/vec3d.h"

@@ -125,7 +125,7 @@ void airy(Context& context) {
 }
 
 void filmFurnace(Context& context) {
-    // A film takes nothing: what is clear cannot be seen, of whatever thickness the film.
+    // A film absorbs nothing: a clear body is invisible, whatever the film's thickness.
     const auto scene = [](const std::string& material, bool body) {
         Stage stage("{position: [0.2, 3, 4], target: [0.5, 0.5, 0.5], fov: 12}",
                     "{max_depth: 400, roulette: false}");
