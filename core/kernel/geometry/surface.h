@@ -69,8 +69,8 @@ CRT_FN vec3 crt_in_frame(CRT_GLOBAL const CrtShape *shape, vec3 v) {
 }
 
 /* Texture coordinates of the place q of a shape's frame. Around the axis u grows from 0 at x to 1; v from 0
-   at a sphere's lower pole to 1 at the upper, whatever is left of it; along a cylinder from end to end. On a
-   disk they are those of the square around it. */
+   at a sphere's lower pole to 1 at the upper, however much of it is left; along a cylinder from end to end.
+   On a disk they are those of the square around it. */
 CRT_FN void crt_shape_uv(CRT_GLOBAL const CrtShape *shape, vec3 q, f32 *u, f32 *v) {
     const f32 x = V3X(q), y = V3Y(q), z = V3Z(q);
     if (shape->kind == CRT_SHAPE_DISK) {

@@ -1,6 +1,6 @@
 /*
  * light.h: sampling the lights: crt_light_choose, then crt_light_sample and crt_light_pdf for emitters,
- * crt_environment_sample and crt_environment_pdf for what lies around. One emissive triangle, or two that
+ * crt_environment_sample and crt_environment_pdf for the environment. One emissive triangle, or two that
  * make a parallelogram, is one light, chosen by power, and so is the environment in scenes that request
  * this. crt_light_view decides how a point on a light is sampled, by the shaded point and the light alone,
  * for both sampling and the pdf: uniformly in solid angle where the light looks large, else uniformly on

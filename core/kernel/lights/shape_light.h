@@ -25,7 +25,7 @@ typedef struct CrtShapeView {
     f32 one_minus_cosine; /* by solid angle: of the cone's edge with its axis */
 } CrtShapeView;
 
-/* At most the distance of a point from a shape; q: the point, in its frame. */
+/* A lower bound of the distance of a point from a shape; q: the point, in its frame. */
 CRT_FN f32 crt_shape_distance(CRT_GLOBAL const CrtShape *shape, vec3 q) {
     const f32 z = V3Z(q);
     const f32 r = crt_sqrt(crt_fma(V3X(q), V3X(q), V3Y(q) * V3Y(q)));

@@ -91,9 +91,9 @@ CRT_FN vec4 crt_loss(const CrtBsdf *b, u32 side, CrtLossPlace place) {
     return lanes == 1u ? splat4(V4X(loss)) : loss;
 }
 
-/* Directions are given back by the steps of the rows, each with its share, in each by the cosine: nearly as
-   light is. Of a textured roughness the next larger row's, of several indices the first one's shares; of
-   azimuths all have those of their mean. */
+/* Directions of this light are sampled by the steps of the rows, each with its share, and within a step by
+   the cosine: nearly as the light is distributed. Of a textured roughness the next larger row's, of several
+   indices the first one's shares; of azimuths all have those of their mean. */
 CRT_FN CRT_GLOBAL const f32 *crt_loss_shares(const CrtBsdf *b, u32 side) {
     return b->losses.rows + b->losses.roughness_step + side * CRT_LOSS_STRIDE + CRT_LOSS_SHARES;
 }

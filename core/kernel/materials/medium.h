@@ -15,8 +15,8 @@
  * list; their back faces restore them. Surfaces with holes differ: a ray inside such a body whose list
  * lacks the medium came in through a hole, is in no glass, and leaves as freely (passing.h).
  *
- * Media that absorb equally share a number, unless their surfaces have holes: paths need not tell them
- * apart.
+ * Media that absorb equally share a number, unless their surfaces have holes: paths need not distinguish
+ * them.
  */
 #ifndef CRT_MEDIUM_H
 #define CRT_MEDIUM_H

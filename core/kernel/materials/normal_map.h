@@ -62,7 +62,8 @@ CRT_FN vec3 crt_mapped_normal(const CrtContext *ctx, const CrtSurface *surface, 
     return size > 0.0f ? mapped * (1.0f / size) : n;
 }
 
-/* Makes of a surface with a normal map the facet, and of wo the direction that it is seen from. */
+/* Turns a surface with a normal map into the facet, and wo into the direction from which the facet is
+   seen. */
 CRT_FN void crt_map_normal(const CrtContext *ctx, CrtSurface *surface, u32 slot, vec3 *wo, CrtBsdf *b) {
     b->facet = 0;
     if (ctx->scene->compositions.count == 0u) return;
@@ -82,7 +83,8 @@ CRT_FN void crt_map_normal(const CrtContext *ctx, CrtSurface *surface, u32 slot,
         *wo = crt_mirrored(*wo, normalize3(b->base * slope_cos - mapped * front));
 }
 
-/* The normal that tells reflection from transmission, and the one that light arrives about by its cosine. */
+/* The normal that separates reflection from transmission, and the one that light arrives about by its
+   cosine. */
 CRT_FN vec3 crt_side(const CrtBsdf *b) { return crt_is_facet(b) ? b->side : b->ng; }
 CRT_FN vec3 crt_base(const CrtBsdf *b) { return crt_is_facet(b) ? b->base : b->ns; }
 

@@ -1,12 +1,12 @@
 /*
- * thin_film.h: a film of some hundred nanometres on a metal or a dielectric: what its two sides reflect
- * interferes. Airy's sum of all rounds within the film (Born and Wolf, 7.6.1), for both polarisations, at
- * each wavelength of the path:
+ * thin_film.h: a film of some hundred nanometres on a metal or a dielectric: the reflections of its two
+ * sides interfere. Airy's sum of all rounds within the film (Born and Wolf, 7.6.1), for both polarisations,
+ * at each wavelength of the path:
  *
  *     r = (r₁₂ + r₂₃ e) / (1 + r₁₂ r₂₃ e),    e = exp(2πi · 2 n₂ d cos θ₂ / λ)
  *
- * The film absorbs nothing: what a dielectric under it does not reflect passes. Beyond the film's critical
- * angle cos θ₂ is imaginary, e real, and light tunnels.
+ * The film absorbs nothing: light that a dielectric under it does not reflect passes. Beyond the film's
+ * critical angle cos θ₂ is imaginary, e real, and light tunnels.
  */
 #ifndef CRT_THIN_FILM_H
 #define CRT_THIN_FILM_H

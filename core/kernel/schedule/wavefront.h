@@ -1,10 +1,10 @@
 /*
  * wavefront.h: paths advanced by separate kernels for tracing and for shading (Laine, Karras and Aila 2013,
  * "Megakernels Considered Harmful"). A slot takes a share of one pixel's samples, one after another. A pass
- * traces what every slot waits for and sorts the slots by the kind of material that they have met; then
- * each kind is shaded by a kernel that holds that kind alone. Between kernels a path lies in rows of 16
- * bytes, a row of all slots after another. A slot computes what crt_render_pixel computes, and adds it to
- * the film in the same order.
+ * traces the ray that each slot waits for and sorts the slots by the kind of material that they have met;
+ * then each kind is shaded by a kernel that holds that kind alone. Between kernels a path lies in rows of
+ * 16 bytes, a row of all slots after another. A slot computes what crt_render_pixel computes, and adds it
+ * to the film in the same order.
  */
 #ifndef CRT_WAVEFRONT_H
 #define CRT_WAVEFRONT_H
@@ -64,7 +64,7 @@ CRT_FN CrtHit crt_trace_passing(const CrtContext *ctx, CrtSampler *sampler, CrtP
 }
 
 /* Traces the shadow ray that a slot waits for, and adds its light where nothing stops it. Returns 0 where
-   crt_wave_choose has to say whether it passes what it meets. */
+   crt_wave_choose has to decide if the ray passes the surface that it meets. */
 CRT_FN int crt_wave_resolve_shadow(const CrtContext *ctx, const CrtWave *wave, u32 slot, u32 state,
                                    CrtRayCount *rays) {
     CrtRay ray = crt_load_shadow_ray(wave, slot);

@@ -1,6 +1,6 @@
 /*
- * value.h: the one reader of what materials and lights are made of. Tables and textures are not compiled for
- * a scene that has none.
+ * value.h: the one reader of the values of materials and lights. Tables and textures are not compiled for a
+ * scene that has none.
  */
 #ifndef CRT_VALUE_H
 #define CRT_VALUE_H
