@@ -315,7 +315,7 @@ void noClamping(Context& context) {
     const std::uint64_t samples = std::uint64_t{1} << 18;
     context.estimate("fireflies keep their value", rareReflection(std::ldexp(1.0, 17)), meanRadiance, 1,
                      0.05, {.samples = samples, .most = 4 * samples}, {{0, "values are clamped"}});
-    // Whatever is cut at some value, and be it above 2^17, is not proportional to the lamp.
+    // Values that are clamped, even above 2^17, are not proportional to the lamp.
     const Film dim = context.render(rareReflection(1), {.samples = samples}),
                bright = context.render(rareReflection(std::ldexp(1.0, 60)), {.samples = samples});
     bool proportional = radiance(dim) > 0;

@@ -1,5 +1,5 @@
-// Group G, the part about surfaces that are rougher one way than the other: they lose no light, and their
-// highlights lie where the tangent says.
+// Group G, the part about surfaces that are rougher in one direction than in the other: they lose no light,
+// and the tangent places their highlights.
 #include "verify/context.h"
 #include "verify/references.h"
 #include "verify/scenes.h"
@@ -47,7 +47,7 @@ void furnace(Context& context) {
                                             how)),
                     1, 2e-3);
             }
-    // What metals take depends on how much their microfacets lose, of every azimuth.
+    // The absorption of metals depends on the losses of their microfacets, at every azimuth.
     for (const double turn : {0.0, 90.0}) {
         const double wide = 0.8, narrow = 0.75;
         const Vec3d along = view(70, turn), across = view(70, 90 - turn);

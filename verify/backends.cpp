@@ -1,4 +1,4 @@
-// Group L: floating point environment and backends. A backend is asked for the bits of crt's own portable
+// Group L: floating point environment and backends. A backend must give the bits of crt's own portable
 // build of the kernel, which is stricter than any tolerance.
 #include "verify/context.h"
 #include "verify/shapes.h"
@@ -99,8 +99,7 @@ void lostDevices(Context& context) {
         "an error of the backend that names it",
         "the wish for a device is dropped, or the failure is not passed on", sentence);
 
-    // Out of time: a host that asks for the end gets it, and the next render is not what the last one left
-    // behind.
+    // Out of time: a render ends when the host requests it, and leaves nothing behind for the next one.
     Integrator integrator(context.backend(), {});
     integrator.setScene(compiled);
     int calls = 0;

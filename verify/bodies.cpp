@@ -1,4 +1,4 @@
-// Group G, the part about bodies of glass: what is inside what, and holes in their surface.
+// Group G, the part about bodies of glass: bodies inside others, and holes in their surface.
 #include "base/vec3d.h"
 #include "verify/context.h"
 #include "verify/references.h"
@@ -56,7 +56,7 @@ void seenThroughLayers(Context& context) {
         const char* name;
         std::vector<Layer> all;
         double eye, towards, depth;  ///< Σ σ d on the way.
-        double mistaken;             ///< Where what is around an inner body is forgotten behind it.
+        double mistaken;             ///< If the path forgets the outer medium behind an inner body.
     };
     const std::vector<Layer> panes{{-5, 5, 0.26}, {-3, -2.5, 0}, {1, 1.5, 0}};
     const std::vector<Layer> nested{{-5, 5, 0.1}, {-3, 3, 0.4}, {-1, 1, 1.1}};

@@ -1,4 +1,4 @@
-// Group J, the part about where a pixel's rays begin and what they pass: the lens, and the pixel filter.
+// Group J, the part about the lens and the pixel filter.
 #include "verify/context.h"
 #include "verify/references.h"
 #include "verify/scenes.h"
@@ -63,7 +63,7 @@ void lens(Context& context) {
                      {beyondChord(2 * edge), "the lens is half as wide: is its radius a diameter?"},
                      {edge < 0 ? 1.0 : 0.0, "there is no lens"}});
             }
-    // What is in focus is sharp: an edge a twentieth of the lens beside the point does not reach it.
+    // A point in focus is sharp: an edge a twentieth of the lens beside the point does not reach it.
     // Without focus_distance the target is in focus.
     for (const char* focus : {"target: [0, 0, 1], focus_distance: 2.5", "target: [0, 0, 2.5]"})
         for (const double side : {1.0, -1.0})
@@ -73,7 +73,7 @@ void lens(Context& context) {
                      fmt::format("{{position: [0, 0, 0], {}, fov: 0.0001, aperture_radius: 0.1}}", focus),
                      pixel, true, side * 0.005, 2.5),
                  glowingHalf("{position: [0, 0, 0], target: [0, 0, 1], fov: 0.0001}", pixel, true, -1, 1)},
-                // What is there and what is missing: never 0, which no interval can be relative to.
+                // 1 + the share of light: never 0, since no interval is relative to 0.
                 [](const std::vector<Film>& f) { return 1 + radiance(f[0]) / radiance(f[1]); },
                 side > 0 ? 1 : 2, 1e-4, {.samples = 256, .most = 256},
                 {{1.5, "the lens is focused elsewhere"}});
@@ -145,7 +145,7 @@ void pixelFilters(Context& context) {
         std::vector<Asked> asked;
         for (std::uint32_t y = 0; y < size; ++y)
             for (std::uint32_t x = 0; x < size; ++x) {
-                // Image right is −x. What is missing to twice the light: no interval is relative to 0.
+                // Image right is −x. 1 + the share of light: no interval is relative to 0.
                 const double in_x = filter.below((1 - pixel * (x + 0.5) - corner_x) / pixel),
                              in_y = filter.below((1 - pixel * (y + 0.5) - corner_y) / pixel);
                 if (x + y < 5 || x + y > 9) continue;

@@ -1,5 +1,5 @@
-/// The suite of `crt verify`: scenes whose answer is known, and the registry that holds them. A case is
-/// asked of every backend alike; what it expects comes from a closed form, from deterministic quadrature, or
+/// The suite of `crt verify`: scenes whose answer is known, and the registry that holds them. A case is the
+/// same for every backend; its expected values come from a closed form, from deterministic quadrature, or
 /// from a relation between images, never from an earlier render.
 ///
 /// To add a case: a function that takes a Context (context.h), and a row in its group's table. The manual
@@ -20,8 +20,8 @@ namespace crt::verify {
 /// or at night.
 enum class Level { Commit, Merge, Nightly };
 
-/// Best first. A statistical check whose interval is too wide to tell is Inconclusive, which counts as a
-/// failure: "could not reject" proves nothing.
+/// Best first. A statistical check whose interval is too wide is Inconclusive, which counts as a failure:
+/// "could not reject" proves nothing.
 enum class Verdict {
     Pass,
     NotApplicable,  ///< Cannot be asked of this backend or of crt; the outcome's note says why.
@@ -50,9 +50,9 @@ class Context;
 struct Case {
     std::string id;         ///< Group and number: "A03".
     std::string name;       ///< For the command line: "square-light". Unique, too.
-    std::string title;      ///< What is asked.
+    std::string title;      ///< The question.
     std::string expected;   ///< The answer, in words or as a formula.
-    std::string source;     ///< Where the answer comes from.
+    std::string source;     ///< The origin of the answer.
     std::string tolerance;  ///< As in the outcomes.
     Level level = Level::Commit;
     std::uint64_t needs = 0;  ///< Features (dialect/features.h) that a backend must have for this case.
@@ -61,7 +61,7 @@ struct Case {
     char group() const { return id.front(); }
 };
 
-/// A row for tables that say much in little space, its members in their order.
+/// A row of a compact table, its members in their order.
 inline Case row(const char* id, const char* name, const char* title, const char* expected,
                 const char* source, const char* tolerance, Level level, std::uint64_t needs,
                 void (*run)(Context&)) {
@@ -75,7 +75,7 @@ const char* name(Verdict verdict);
 /// Reads "commit", "merge" or "nightly".
 std::optional<Level> levelNamed(std::string_view text);
 
-/// A case is as good as its worst outcome; one without any has asked nothing and fails.
+/// A case is as good as its worst outcome; one without any has tested nothing and fails.
 Verdict worst(const std::vector<Outcome>& outcomes);
 inline bool failed(Verdict verdict) { return verdict >= Verdict::Inconclusive; }
 
@@ -87,7 +87,7 @@ const std::vector<Case>& registry();
 /// one by one. Throws crt::Error(Usage) for a word that names nothing.
 std::vector<const Case*> select(const std::vector<std::string>& words, Level level);
 
-/// Groups, each in a file of its own.
+/// Groups, each in a separate file.
 std::vector<Case> closedFormCases();     ///< A
 std::vector<Case> glassCases();          ///< A, the part about smooth interfaces
 std::vector<Case> scaleCases();          ///< B
@@ -104,7 +104,7 @@ std::vector<Case> roughSurfaceCases();   ///< G, microfacets
 std::vector<Case> glasswareCases();      ///< G, rough glass and panes
 std::vector<Case> paneCases();           ///< G, light that crosses panes
 std::vector<Case> compositionCases();    ///< G, opacity and mixes
-std::vector<Case> bodyCases();           ///< G, bodies of glass: what is inside what, holes
+std::vector<Case> bodyCases();           ///< G, bodies of glass: one inside another, holes
 std::vector<Case> shadingNormalCases();  ///< G, interpolated normals and normal maps
 std::vector<Case> thinFilmCases();       ///< G, thin films
 std::vector<Case> anisotropyCases();     ///< G, brushed surfaces
@@ -117,7 +117,7 @@ std::vector<Case> colourCases();         ///< H
 std::vector<Case> textureCases();        ///< H, the part about textures
 std::vector<Case> accumulationCases();   ///< I
 std::vector<Case> cameraCases();         ///< J: lens and filter
-std::vector<Case> firstHitCases();       ///< D, J: what is told of first hits
+std::vector<Case> firstHitCases();       ///< D, J: the outputs of first hits
 std::vector<Case> imageCases();          ///< J
 std::vector<Case> backendCases();        ///< L
 std::vector<Case> exactRelationCases();  ///< M01 to M19

@@ -165,8 +165,8 @@ void kirchhoff(Context& context) {
 
 void randomTriangles(Context& context) {
     // Each alone over the floor, one after another; some dip below it and are cut off by the horizon.
-    // Equivalence must hold for every one, so many tests do not make passing easier; that a right renderer
-    // fails has been made as unlikely as for one alone by keeping the effort growing.
+    // Equivalence must hold for every one, so the number of tests does not make passing easier. The effort
+    // keeps growing, so that a right renderer fails as rarely as with one triangle alone.
     std::mt19937_64 random(20241);
     std::uniform_real_distribution<double> sideways(-2, 2), upward(-0.3, 2);
     const int count = context.atLeast(Level::Merge) ? 100 : 8;
@@ -175,7 +175,7 @@ void randomTriangles(Context& context) {
         std::vector<Vec3d> corners;
         for (int v = 0; v < 3; ++v) corners.push_back({sideways(random), upward(random), sideways(random)});
         const double expected = polygonFormFactor({0, 0, 0}, {0, 1, 0}, corners);
-        // Not between eye and receiver, and not so thin a sliver that it says nothing.
+        // Not between eye and receiver, and no sliver that is too thin to test anything.
         const double off =
             std::min({std::abs(corners[0][1]), std::abs(corners[1][1]), std::abs(corners[2][1])});
         if (expected < 0.01 || off < 0.05 || distanceToPlane({0, 0, 0}, {0.02, 0.05, 0}, corners) < 0.05)
@@ -277,7 +277,7 @@ void parallelMirrors(Context& context) {
 struct CubeProbe {
     const char* where;
     const char* camera;
-    std::array<int, 4> commit_depths;  ///< What is asked on every commit; the rest from merge on.
+    std::array<int, 4> commit_depths;  ///< Tested on every commit; the others from merge on.
     double at_depth_1, at_depth_2, at_depth_3, at_depth_5, at_depth_10, at_infinity;
 };
 constexpr CubeProbe kCubeProbes[] = {
@@ -320,8 +320,8 @@ void glowingCeiling(Context& context) {
 
 void energyBalance(Context& context) {
     // A room of six colours with a lamp flush in its ceiling. Seen from the centre with a field of view of
-    // 90°, a wall fills the film, and pixels are equal areas of it. What the walls absorb is (1 − ρ)/ρ
-    // of what they reflect.
+    // 90°, a wall fills the film, and pixels are equal areas of it. The walls absorb (1 − ρ)/ρ times
+    // the light that they reflect.
     struct Wall {
         const char* name;
         const char* corners;

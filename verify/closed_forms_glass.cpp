@@ -15,7 +15,7 @@
 namespace crt::verify {
 namespace {
 
-/// n of the glass in these cases, unless they say otherwise.
+/// n of the glass in these cases, unless a case sets another.
 constexpr double kIndex = 1.5;
 constexpr std::uint64_t kGlass = CRT_FEATURE_DIELECTRIC | CRT_FEATURE_ENVIRONMENT;
 
@@ -240,7 +240,7 @@ Vec2 refract(Vec2 d, Vec2 n, double eta) {
     return d * (1 / eta) + n * (c / eta - std::sqrt(1 - (1 - c * c) / (eta * eta)));
 }
 
-/// Where o + t·d meets the line through p with normal n.
+/// The point at which o + t·d meets the line through p with normal n.
 Vec2 meet(Vec2 o, Vec2 d, Vec2 p, Vec2 n) { return o + d * (dot(n, p + o * -1.0) / dot(n, d)); }
 
 /// A 60° prism with its apex up, entered at the middle of its left face at 49.3233489°, the angle of least

@@ -301,7 +301,7 @@ double ljungBox(const std::vector<double>& residuals, std::size_t lags) {
 }
 
 void spectralBins(Context& context) {
-    // 64 bins of 5 nm from 390 to 710 nm, each with random numbers of its own. Four wavelengths a path that
+    // 64 bins of 5 nm from 390 to 710 nm, each with separate random numbers. Four wavelengths a path that
     // were placed or weighed unequally would show as a pattern over the bins.
     constexpr int bins = 64, seeds = 16;
     std::vector<double> residuals;

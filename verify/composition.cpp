@@ -35,7 +35,7 @@ std::string black(const std::string& opacity) {
 
 void sheets(Context& context) {
     const Effort effort{.samples = 64, .most = 65536};
-    // What a camera ray passes. Nothing is scattered: that a depth of 0 suffices says so.
+    // Camera rays pass sheets without being scattered, so a depth of 0 suffices.
     for (const int count : {1, 4})
         for (const double opacity : {0.0, 0.3, 1.0}) {
             Stage stage(kDown, "{max_depth: 0}");
@@ -48,7 +48,7 @@ void sheets(Context& context) {
                              stage.yaml(), meanRadiance, std::pow(1 - opacity, count), 0.005, effort,
                              {{1 - opacity, "one sheet alone stops light, or all decide alike"}});
         }
-    // What the rays pass that light a floor: from a lamp, a light without a surface, all around.
+    // Sheets between a floor and its light: a lamp, a light without a surface, the surroundings.
     for (const auto& [name, integrator] : kDirectTechniques)
         for (const int count : {3, 1}) {
             constexpr double kOpacity = 0.4;

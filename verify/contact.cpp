@@ -122,7 +122,7 @@ std::string contactScene(const std::vector<Vec3d>& lamp, bool two_sided, std::si
         .yaml();
 }
 
-/// What is asked at one distance.
+/// The question at one distance.
 struct Question {
     std::string where;
     Lamp lamp;
@@ -130,7 +130,7 @@ struct Question {
     double tolerance = 0.005;
 };
 
-/// Whether chance finds enough of the lamp to tell anything.
+/// True if scattered rays find the lamp often enough for an answer.
 bool foundByChance(double form_factor) { return form_factor > 0.05; }
 
 /// The answer for one shape of the lamp, in one order of its vertices and one frame.
@@ -180,8 +180,7 @@ std::vector<double> distances(const Context& context) {
     return {0x1p-3, 0x1p-7, 0x1p-10, 0x1p-12, 0x1p-14, 0x1p-17};
 }
 
-/// A receiver as small as single precision needs to place its points to 1e-6 of the distance that is asked
-/// about.
+/// A receiver as small as single precision needs to place its points to 1e-6 of the distance in question.
 Receiver smallReceiver(const Vec3d& point, const Vec3d& normal, double distance) {
     return {point, normal, 8 * distance, 16 * distance};
 }
@@ -243,8 +242,8 @@ void nearlyCoplanar(Context& context) {
 }
 
 void grazing(Context& context) {
-    // Past the end of a lamp that stands on the floor, hardly off its plane: what is seen of it is as thin
-    // as the distance.
+    // Past the end of a lamp that stands on the floor, hardly off its plane: the visible part of the lamp
+    // is as thin as the distance.
     const Lamp lamp{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, true};
     for (const double d : distances(context))
         for (const double gap : {0.0, 0.5})

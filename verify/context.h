@@ -1,5 +1,5 @@
-/// What a case has in its hands: the backend under test, renders of scenes given as YAML, and the checks
-/// that turn figures into outcomes.
+/// The context of a case: the backend under test, renders of scenes given as YAML, and the checks that turn
+/// figures into outcomes.
 #pragma once
 
 #include "backend/integrator.h"
@@ -19,7 +19,7 @@
 
 namespace crt::verify {
 
-/// How a scene is rendered.
+/// The settings of a render.
 struct Render {
     std::uint64_t samples = 16;
     std::uint64_t first_sample = 0;
@@ -28,7 +28,7 @@ struct Render {
     CrtKernelChoice kernel = CRT_KERNEL_LEAN;
     unsigned threads = 0;
     unsigned tile_size = 0;
-    bool squares = false;  ///< One sequence, whose film knows the variance of its paths (pathVariance).
+    bool squares = false;  ///< One sequence, whose film has the variance of its paths (pathVariance).
 };
 
 inline Render samples(std::uint64_t count, std::uint32_t aovs = 0) {
@@ -42,8 +42,8 @@ struct Mistake {
     std::string physics;
 };
 
-/// How many samples an estimate may take. It begins with `samples` a pixel and seed, and goes on with four
-/// times as many while it cannot tell.
+/// The number of samples that an estimate may take. It begins with `samples` a pixel and seed, and goes on
+/// with four times as many while it is inconclusive.
 struct Effort {
     std::uint64_t samples = 64;
     std::uint64_t most = 4096;
@@ -74,7 +74,7 @@ public:
 
     const LoadedBackend& backend() const { return backend_; }
     Level level() const { return level_; }
-    /// Whether the questions that are reserved for `level` are to be asked.
+    /// True if this run includes the questions that are reserved for `level`.
     bool atLeast(Level level) const { return level_ >= level; }
     /// A number for each level: on every commit, before a merge, at night.
     std::uint64_t byLevel(std::uint64_t commit, std::uint64_t merge, std::uint64_t nightly) const {
@@ -100,7 +100,7 @@ public:
     /// Equivalence: the 99.9 % Student interval of the mean of `replicates` lies within ±delta · expected.
     void equivalent(const std::string& what, const std::vector<double>& replicates, double expected,
                     double delta, const std::vector<Mistake>& mistakes = {});
-    /// The same of what `replicatesOf` so many samples come out, with as many as it takes.
+    /// The same of the values of `replicatesOf`, for a number of samples that grows as far as needed.
     void equivalent(const std::string& what,
                     const std::function<std::vector<double>(std::uint64_t samples)>& replicatesOf,
                     double expected, double delta, const Effort& effort);

@@ -1,5 +1,5 @@
-// Group J, the part about what is told of first hits: normal, albedo and depth; and where the attributes of
-// placed meshes and of shapes lie, which they show.
+// Group J, the part about the outputs of first hits: normal, albedo and depth; and the places of the
+// attributes of placed meshes and of shapes, which these outputs show.
 #include "base/temporary_folder.h"
 #include "verify/context.h"
 #include "verify/references.h"
@@ -62,7 +62,7 @@ void normalsOfHits(Context& context) {
         sameDirection(context, fmt::format("a floor with normals of its corners, at x = {}", x),
                       normalOf(context.render(context.scene(scene), samples(16, kNormalAndDepth))),
                       unit(left * (1 - share) + right * share), 1e-5,
-                      {{{0, 1, 0}, "the geometric normal is told, not that of shading"}});
+                      {{{0, 1, 0}, "the output is the geometric normal, not that of shading"}});
     }
 }
 

@@ -1,5 +1,5 @@
-// Group C: degenerate and awkward geometry. Furnaces tell: where every surface brings the same radiance, a
-// ray that leaks, or meets what it should not, shows.
+// Group C: degenerate and awkward geometry. Furnaces show it: where every surface brings the same radiance,
+// a ray that leaks, or meets a wrong surface, is visible.
 //
 // Over 450 lines: cases, each a scene and its answer, that share nothing with their neighbours.
 #include "verify/probes.h"
@@ -144,7 +144,8 @@ void duplicates(Context& context) {
 
 void coplanar(Context& context) {
     for (const int ulps : {0, 1, 4, 32}) {
-        // Two squares of different radiance, the second nearer by so many ulps of a coordinate in [½, 1).
+        // Two squares of different radiance, the second nearer by this number of ulps of a coordinate in
+        // [½, 1).
         Scene scene = emptyScene(64, 1, {0.1, 0.2, -1}, {0, 0, 0.6}, 0.2);
         scene.integrator.max_depth = 0;
         for (const int k : {0, 1}) {
@@ -170,7 +171,7 @@ void coplanar(Context& context) {
     }
 }
 
-/// A room whose walls, and whatever is put into it, all emit 1 and reflect ½.
+/// A room whose walls and contents all emit 1 and reflect ½.
 Scene evenRoom(std::uint64_t seed) {
     Scene scene = emptyScene(24, seed, {0.1, 0.15, 0.2}, {0.6, 0.3, 0.7}, 0.9);
     scene.integrator.max_depth = 16;

@@ -28,7 +28,7 @@ std::string roughGlass(double ior, double roughness) {
     return fmt::format("{{type: rough_dielectric, ior: {}, roughness: {}}}", ior, roughness);
 }
 
-/// What an eye at `cosine` sees of light 1 from everywhere: what is refracted is compressed by n².
+/// The radiance towards an eye at `cosine` under uniform light 1: refracted light is compressed by n².
 double seen(double cosine, double eta, double roughness) {
     const ScatteredShares shares = roughDielectricShares(cosine, eta, roughness);
     return shares.reflected + shares.transmitted / (eta * eta);

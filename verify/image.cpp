@@ -202,8 +202,7 @@ void crops(Context& context) {
                                      : 1;
     }
     context.relative("values of three crops that are not the whole film's", static_cast<double>(differing),
-                     0, 0,
-                     {{static_cast<double>(differing), "a crop has random numbers, or rays, of its own"}});
+                     0, 0, {{static_cast<double>(differing), "a crop has its own random numbers, or rays"}});
 }
 
 void brightFiles(Context& context) {

@@ -149,7 +149,7 @@ void againstFlattened(Context& context) {
 /// A square that is the only mesh of its scene, placed twice, with an attribute of its corners.
 struct Attribute {
     const char *name, *material, *corners, *surroundings;
-    double expected, lost;  ///< What is seen at (u, v) = (0.6, 0.3); and where the attribute is lost.
+    double expected, lost;  ///< Seen at (u, v) = (0.6, 0.3); and without the attribute.
 };
 
 void sharedAttributes(Context& context) {

@@ -60,7 +60,7 @@ void manyLights(Context& context) {
             sum += intensity * d[1] / std::pow(dot(d, d), 1.5);
         }
         if (chance) sum -= 0.5 / std::sqrt(1.13);
-        // From below the lamps, lest they hide the floor.
+        // From below the lamps, so that they do not hide the floor.
         Stage stage(
             fmt::format("{{position: [{}, 0.5, {}], target: [{}, 0, {}], fov: 0.0001}}", x + 0.4, z, x, z),
             integrator);
@@ -91,7 +91,7 @@ void tile(Stage& stage, const Vec3d& corner, const Vec3d& a, const Vec3d& b) {
 }
 
 /// A floor in a room whose walls and ceiling glow evenly, as eighty lamps. As many lie below the floor and
-/// face its plane: they light nothing of it, and the tree knows that by the floor's normal.
+/// face its plane: they do not light it, and the tree excludes them by the floor's normal.
 std::string tiledRoom(const std::string& material, const std::string& integrator, bool lamps_below) {
     Stage stage(eyeAt({0.3, 0.4, 0.1}, "[0.2, 0.1, 1]"), integrator);
     stage.material("it", material)

@@ -417,7 +417,7 @@ std::vector<Case> lightCases() {
             "0.2394564705 always", "rectangle formula", "± 0.1 %", Level::Commit,
             kDirectLight | CRT_FEATURE_BVH, tiledLight),
         row("E08", "many-lights",
-            "How light sampling chooses among up to 1e7 lights "
+            "The choice of light sampling among up to 1e7 lights "
             "of equal power, and between powers of 1e20 : 1",
             "equal shares; the weak light at least once in 2³²", "arithmetic", "0.5 %", Level::Commit, 0,
             choosingAmongMany),

@@ -52,7 +52,7 @@ void rouletteLongPaths(Context& context) {
 }
 
 void insideGlass(Context& context) {
-    // Whatever is reflected to and fro before it leaves, it carries n² when it does: in a uniform world the
+    // Light carries n² when it leaves, however often it was reflected inside: in a uniform world the
     // radiance in glass is n² in all directions.
     const auto scene = [](double index) {
         return fmt::format(R"(crt: 1
@@ -224,7 +224,7 @@ objects:
 }
 
 void grazingBoxes(Context& context) {
-    // The boxes of a tree and those of objects take the reciprocal of a direction each in a way of its own.
+    // The boxes of a tree and those of objects each take the reciprocal of a direction in their own way.
     for (const char* accelerator : {"bvh", "aabb"}) {
         grazeBox(context, accelerator, "right", 1 - 5e-6, 0.1);
         grazeBox(context, accelerator, "left", -1 + 5e-6, 0.1);
@@ -353,7 +353,7 @@ std::vector<Case> mutantCases() {
         {.id = "N09",
          .name = "beyond-2-32",
          .title = "Samples beyond the four thousand millionth",
-         .expected = "samples of their own",
+         .expected = "separate samples",
          .source = "an index has 64 bits",
          .tolerance = "exactly",
          .needs = CRT_FEATURE_ENVIRONMENT,

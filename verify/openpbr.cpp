@@ -63,7 +63,8 @@ void metals(Context& context) {
 }
 
 void limits(Context& context) {
-    // What comes out of a gloss has the colour that is said; what it reflects is white, and comes first.
+    // Light out of a gloss has the colour of the scene file; light that the gloss reflects is white, and
+    // comes first.
     const Render how{.samples = 1u << 12};
     for (const double roughness : {0.0, 0.5})
         for (const double degrees : {0.0, 60.0, 80.0})
@@ -323,7 +324,8 @@ double cauchyOfAbbe(double n_d, double abbe, double nm) {
 }
 
 void dispersion(Context& context) {
-    // What a floor mirrors straight on tells its index in each bin; black below it takes the rest.
+    // The light that a floor mirrors straight on gives its index in each bin; black below it absorbs the
+    // rest.
     constexpr double kMiddle = 1.5, kAbbe = 4, kScale = 0.5, kFrom = 400, kTo = 700;
     constexpr std::uint32_t kBins = 6;
     const std::string scene =

@@ -24,7 +24,7 @@ std::string under(const Lacquer& coat, const std::string& base, double weight = 
                        base, weight, coat.color, coat.roughness, coat.ior, coat.darkening);
 }
 
-/// What the specification says of a metal's or a gloss's roughness under a rough coat.
+/// The roughness of a metal or a gloss under a rough coat, by the specification.
 double widened(double base, double coat) {
     return std::pow(std::min(1.0, std::pow(base, 4) + 2 * std::pow(coat, 4)), 0.25);
 }
@@ -70,7 +70,7 @@ void beamsOnCoats(Context& context) {
                      {{0.8 * taken * sheenDensity(view, light, 0.5) + below, "the fuzz takes nothing"}});
 }
 
-/// In light from everywhere: nothing is lost over white, and of what is not white as much as is said.
+/// In uniform light: nothing is lost over white, and the stated share over other colours.
 void skies(Context& context) {
     constexpr const char* kWhite[] = {"base_color: 1", "base_color: 1, specular_weight: 0",
                                       "base_color: 1, base_metalness: 1, specular_roughness: 0",
@@ -92,7 +92,8 @@ void skies(Context& context) {
             const Lacquer amber{.ior = 1.5, .roughness = roughness, .color = 0.5, .darkening = 0.75};
             seen(fmt::format("diffuse, 0.6, under an amber coat of roughness {}", roughness),
                  under(amber, "base_color: 0.6, specular_weight: 0"), degrees, amber.albedo(cosine, 0.6));
-            // Metals: how rough they are counts twice, for what they reflect and for what is sent back.
+            // Metals: their roughness counts twice, for the light that they reflect and for the light that
+            // the coat sends back.
             Lacquer coat{.ior = 1.4, .roughness = roughness, .base_roughness = 0.4};
             const double metal =
                 tintedMetalAlbedo(cosine, 0.6, 0.3, 0.9, widened(coat.base_roughness, roughness));
@@ -125,7 +126,7 @@ void skies(Context& context) {
                  under(coat, fmt::format("base_color: 0.5, specular_roughness: 0, specular_ior: {}", ior)),
                  degrees, with(below + 0.5 * (1 - below)));
         }
-        // In part: so much of the surface is bare.
+        // A coat on part of the surface: the rest is bare.
         const Lacquer clear{.roughness = 0.5};
         seen("a quarter of a coat", under(clear, "base_color: 0.5, specular_weight: 0", 0.25), degrees,
              0.75 * 0.5 + 0.25 * clear.albedo(cosine, 0.5));

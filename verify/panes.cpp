@@ -68,7 +68,7 @@ void lightsBehindPanes(Context& context) {
                                   {std::pow((1 - r) / (1 + r), panes), "polarisation is lost in a pane"}});
             }
     }
-    // Every way of finding surfaces finds all panes of every form, and what is among them.
+    // Every way of finding surfaces finds all panes of every form, and the surfaces among them.
     const std::string sun = "[{type: directional, direction: [0, -1, 0], irradiance: 1}]";
     const std::string sphere =
                           "{sphere: {radius: 0.1}, transform: [{translate: [0, 0.6, 0]}], material: it}",
@@ -97,7 +97,7 @@ void lightsBehindPanes(Context& context) {
                              {{std::pow(12.0 / 13, crossings), "shadow rays miss a pane"},
                               {std::pow(12.0 / 13, crossings / 2 + 1), "a sphere is passed once"}});
         }
-    // In part a pane, or there in part: chances of their own for each surface.
+    // A mix with a pane, or a pane with an opacity: each surface has a separate chance.
     constexpr double once = 12.0 / 13;
     for (const auto& [what, material, through] :
          {std::tuple{"half a pane, half black", "{type: mix, materials: [pane, black], amount: 0.5}",

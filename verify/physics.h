@@ -1,4 +1,4 @@
-/// What wrong figures say about the physics that is wrong.
+/// The wrong physics that wrong figures point to.
 #pragma once
 
 #include "verify/context.h"

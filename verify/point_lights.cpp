@@ -322,7 +322,7 @@ void iesLamps(Context& context) {
                    {{expected(-1), "horizontal angles go the other way round"},
                     {expected(1) * 2, "the ballast factor is not applied"}});
     }
-    // What is left out because it is symmetric, and what it stands for.
+    // Columns that a file leaves out by symmetry, and the columns that the file stands for.
     const std::vector<double> q{500, 400, 300, 500, 200, 100, 500, 50, 20};  // 0, 30 and 90 degrees
     const auto column = [&q](std::size_t i) {
         return std::vector<double>{q[3 * i], q[3 * i + 1], q[3 * i + 2]};

@@ -115,9 +115,9 @@ Render how(std::uint64_t samples, std::uint64_t first = 0, std::uint32_t aovs = 
     return render;
 }
 
-/// Calls `use` with every pixel's place in the film and its radiance. One sample's radiance depends a little
-/// on its wavelengths, up to a factor of two at the ends of the observer's range: only ratios of films of
-/// the same samples, and orders of magnitude, tell anything.
+/// Calls `use` with every pixel's place in the film and its radiance. One sample's radiance depends a
+/// little on its wavelengths, up to a factor of two at the ends of the observer's range: only ratios of
+/// films of the same samples, and orders of magnitude, are meaningful.
 template <class Use>
 void forEachPixel(const Film& film, Use use) {
     for (std::uint32_t y = 0; y < film.shape().height; ++y)

@@ -20,7 +20,7 @@ struct Tally {
     }
 };
 
-/// What rays are aimed at: a vertex, a point of an edge, or anywhere on a mesh.
+/// The targets of rays: a vertex, a point of an edge, or anywhere on a mesh.
 enum class Aim { Vertex, Edge, Face };
 const char* name(Aim aim);
 

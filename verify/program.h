@@ -1,4 +1,4 @@
-/// What `crt verify` runs: `crt_conformance verify OPTIONS`.
+/// The program behind `crt verify`: `crt_conformance verify OPTIONS`.
 #pragma once
 
 #include <string>
@@ -6,7 +6,7 @@
 
 namespace crt::verify {
 
-/// Reads the options of `crt verify`, in their long form with each value as a word of its own, and runs the
+/// Reads the options of `crt verify`, in their long form with each value as a separate word, and runs the
 /// cases. Returns the exit code: 0 when every case passes or does not apply; 7 when one fails or is
 /// inconclusive; 128 + signal when interrupted. Throws crt::Error.
 int runSuite(const std::vector<std::string>& words);

@@ -76,7 +76,7 @@ const std::string& biconvexObjects() {
 }
 const std::string kBall = "[{material: it, sphere: {radius: 1}}]";
 
-/// Seen from the axis, at −z, a sun on the axis behind the lens fills a disk whose size tells the focal
+/// Seen from the axis, at −z, a sun on the axis behind the lens fills a disk whose size gives the focal
 /// length: a ray at the angle u leaves at u (1 − s/f), s from the lens.
 struct Sighting {
     double distance;    ///< Of the camera.
@@ -86,7 +86,7 @@ struct Sighting {
 
 /// Mean radiance of the frame where the sun has radiance 1.
 double seen(const std::vector<Refracting>& lens, double n, const Sighting& at) {
-    // What is lit is a disk: the angle only grows with the ray's.
+    // The lit part is a disk: the angle only grows with the ray's.
     double inside = 0, outside = std::atan(at.half_frame);
     for (int i = 0; i < 60; ++i) {
         const double middle = (inside + outside) / 2;
@@ -209,9 +209,9 @@ void furnaces(Context& context) {
                              {.samples = 32, .most = 2048});
         }
 
-    // An integrating sphere: a black lamp of area A on both sides, small, in its middle. What the wall gets
-    // from itself is the same everywhere, ρΦ/4πR² over what is lost at each round, but for what the lamp
-    // hides and takes: on average A/2πR².
+    // An integrating sphere: a black lamp of area A on both sides, small, in its middle. The wall lights
+    // itself equally everywhere, by ρΦ/4πR² over the loss at each round, except for the light that the
+    // lamp hides and absorbs: on average A/2πR².
     constexpr double kSide = 0.1, kReflectance = 0.8, kRadiance = 100;
     constexpr double kArea = kSide * kSide, kFlux = 2 * kPi * kArea * kRadiance, kWall = 4 * kPi;
     const double taken = 2 * kArea / kWall;

@@ -195,8 +195,8 @@ Mesh soup(Dice& dice, int count, double least = -2.5, double most = -0.5) {
 constexpr std::uint32_t kFirstHit = kAovNormal | kAovDepth | kAovPrimitive;
 
 void occlusionAndClosest(Context& context) {
-    // Light sampling asks whether anything is in between, scattering what is nearest. Where only one of them
-    // brings light, both must bring the same.
+    // Light sampling tests if any surface lies between; scattering finds the nearest surface. Where either
+    // alone brings light, both must bring the same.
     const int count = context.atLeast(Level::Merge) ? 12 : 2;
     for (int i = 0; i < count; ++i) {
         Dice dice(static_cast<std::uint64_t>(i) + 1);

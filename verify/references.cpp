@@ -231,8 +231,8 @@ double oncePerfectAlbedo(double cosine, double alpha, int panels = kPanels) {
 
 constexpr int kFew = 4;  ///< Panels of what is a mean of means.
 
-/// Of what was lost of a reflectance with this mean, the share that comes back: mirrored a second time it
-/// does, or a third time, …
+/// Of the light that microfacets of this mean reflectance lose, the share that comes back: after a second
+/// reflection, or a third, …
 double returnedShare(double mean, double lost) {
     const double escapes = 1 - 0.76 * lost;  // by random walks, tests/unit_microfacets.cpp
     double returned = 0, left = mean;

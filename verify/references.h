@@ -1,4 +1,4 @@
-/// What the cases expect, worked out in double from closed forms and deterministic quadrature.
+/// The expected values of the cases, computed in double from closed forms and deterministic quadrature.
 #pragma once
 
 #include "spectra/spectra.h"
@@ -82,16 +82,16 @@ ScatteredShares microfacetShares(double cosine, double eta, double roughness);
 ScatteredShares roughDielectricShares(double cosine, double eta, double roughness);
 
 /// Of light from everywhere, the share that a diffuse base of albedo `base` under a coat of index `eta`
-/// sends towards a view at `cosine`: the coat's once-mirrored light, and of the rest all rounds between base
-/// and coat as a geometric series. What the coat sends back from below follows from what it lets in: diffuse
-/// light through it is η² times as much one way as the other.
+/// sends towards a view at `cosine`: the coat's once-mirrored light, and of the rest all rounds between
+/// base and coat as a geometric series. The share that the coat sends back from below follows from the
+/// share that it lets in: it transmits η² times as much diffuse light in one direction as in the other.
 double plasticAlbedo(double cosine, double base, double eta, double roughness);
 
 /// Of diffuse light from below, the share that such a coat sends back.
 double internalReflectance(double eta, double roughness);
 
-/// The coat of OpenPBR Surface 1.1, by the formulas of its section on coats, on a base that is said to be
-/// so rough.
+/// The coat of OpenPBR Surface 1.1, by the formulas of its section on coats, on a base of the given
+/// roughness.
 struct Lacquer {
     double ior = 1.6, roughness = 0, color = 1, darkening = 1, base_roughness = 1;
 

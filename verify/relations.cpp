@@ -1,4 +1,4 @@
-// Group M: relations between images. Those that hold exactly, M01 to M19, ask for the same bits and cost
+// Group M: relations between images. Those that hold exactly, M01 to M19, require the same bits and cost
 // little; they need no reference.
 #include "verify/context.h"
 #include "verify/shapes.h"
@@ -254,7 +254,7 @@ void unusedThings(Context& context) {
                      "what is not used reaches the image");
 }
 
-/// Whether the lean kernel was another than the full one.
+/// True if the lean kernel differed from the full one.
 bool prunes(Context& c, const std::string& name, const Scene& scene, std::uint32_t aovs) {
     const Film lean = c.render(scene, {.samples = 4, .aovs = aovs, .kernel = CRT_KERNEL_LEAN_ONLY});
     const std::uint64_t left = c.report().kernel_features;
@@ -314,7 +314,7 @@ void deeperThanPaths(Context& context) {
     for (const int depth : {4, 64, 1000000})
         context.sameBits(fmt::format("depth {} as 3", depth), ended, at(depth),
                          "paths go on after they have left the scene, or the depth counts otherwise");
-    context.holds("depth 2 is another image", radiance(at(2)) != radiance(ended), "other bits",
+    context.holds("depth 2 gives a different image", radiance(at(2)) != radiance(ended), "other bits",
                   "the question is empty: no path has three reflections");
 }
 

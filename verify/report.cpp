@@ -22,7 +22,7 @@ std::string measuredText(const Outcome& o) {
     return text;
 }
 
-/// What a failed outcome says, in the two or three lines under its case.
+/// The text of a failed outcome, in the two or three lines under its case.
 std::string failureText(const Outcome& o) {
     std::string text = fmt::format("       {}: {}", name(o.verdict), o.what);
     if (o.measured && o.expected)

@@ -1,4 +1,4 @@
-/// What a run of the suite is written as.
+/// The formats in which a run of the suite is written.
 #pragma once
 
 #include "verify/run.h"

@@ -1,5 +1,4 @@
-// docs/stability.md: the registry as a manual page, so that it cannot tell anything else than what is
-// tested.
+// docs/stability.md: the registry as a manual page, so that the page and the tests cannot differ.
 #include "verify/report.h"
 
 #include <fmt/format.h>

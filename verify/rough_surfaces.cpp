@@ -35,7 +35,8 @@ void roughFurnace(Context& context) {
                                     {squared, "the width of GGX is the roughness, not its square"}};
     };
     const Render how{.samples = 1u << 12};
-    // Of a perfect metal nothing is lost; of another, what Fresnel's equations say of one and more rounds.
+    // A perfect metal loses nothing; other metals lose what Fresnel's equations give for one and more
+    // rounds.
     for (const auto& [n, k] : {std::pair{1.0, 1e6}, std::pair{0.2, 3.0}})
         for (const double roughness : {0.0, 0.1, 0.3, 0.5, 0.7, 1.0})
             for (const double degrees : {0.0, 60.0, 85.0, 89.0}) {
@@ -75,8 +76,7 @@ std::string roughMetal(double n, double k, double roughness) {
     return fmt::format("{{type: rough_conductor, eta: {:g}, k: {:g}, roughness: {:g}}}", n, k, roughness);
 }
 
-/// Where microfacets are sharpest their distribution has the fewest digits: GGX's width is 1e-3 at the
-/// least.
+/// The distribution of the sharpest microfacets has the fewest digits: GGX's width is 1e-3 at the least.
 void roughPeak(Context& context) {
     const Vec3d view = unit({0.4, 0.2, 0.7});
     for (const double roughness : {0.032, 0.04, 0.06, 0.1}) {
@@ -115,7 +115,7 @@ void roughLimit(Context& context) {
                 rough ? roughConductorAlbedo(cosine, 0.2, 3, roughness) : fresnelConductor(cosine, 0.2, 3),
                 2e-3);
             if (roughness != 0.032 && roughness != 0.02 && !context.atLeast(Level::Merge)) continue;
-            // What glass over black sends back.
+            // The light that glass over black sends back.
             const std::string glass =
                 Stage(eyeAt({std::sin(degrees * kDegree), cosine, 0}, "[0, 0, 1]"), kDirect)
                     .material("it",

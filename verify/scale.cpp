@@ -85,7 +85,7 @@ void embreesFarPlace(Context& context) {
                          "before the scene is moved to its centre?");
 }
 
-/// What single precision cannot resolve is said, not passed over in silence.
+/// Loading must warn about geometry that single precision cannot resolve.
 void warned(Context& context, const std::string& what, const Scene& scene) {
     const int before = warningCount();
     compileScene(scene, 0);
@@ -412,7 +412,7 @@ void areasOfShapes(Context& context) {
             addLamp(lit, std::move(all));
             const double share = radiance(context.render(scene, samples(seen))) /
                                  radiance(context.render(lit, samples(seen)));
-            // How far the rim is from where it should be; an area grows with it, a disk's twice.
+            // The distance of the rim from its right place; an area grows with it, a disk's twice.
             const double off = (share - window.shown()) * kKept * window.pixel() * window.depth();
             context.relative(fmt::format("area of a {} as rays meet it, {:g} away", name, distance),
                              1 + (type == QuadricType::Disk ? 2 : 1) * off, 1, 1e-5,

@@ -51,7 +51,7 @@ double cylinderFactor(double radius, double half, double height) {
            kPi;
 }
 
-/// What a camera sees inside a hollow shape of reflectance 0.5 that shines with radiance 1, at depth 1.
+/// A camera inside a hollow shape of reflectance 0.5 that shines with radiance 1, at depth 1.
 std::string insideLamp(const std::string& shape, const std::string& transform, const std::string& view,
                        const std::string& integrator, const char* two_sided) {
     return fmt::format(

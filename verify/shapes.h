@@ -1,5 +1,5 @@
-/// Geometry and scenes for the verification cases, made in memory: what they are must not depend on a file
-/// or on a reader.
+/// Geometry and scenes for the verification cases, made in memory: they must not depend on a file or on a
+/// reader.
 #pragma once
 
 #include "base/vec3d.h"
@@ -49,7 +49,7 @@ Material diffuse(double reflectance);
 Material mirror(double reflectance);
 Material glass(double index);
 
-/// Adds a mesh as an object of its own. `radiance` 0: it does not emit. Returns the object's index.
+/// Adds a mesh as a separate object. `radiance` 0: it does not emit. Returns the object's index.
 std::size_t addObject(Scene& scene, Mesh mesh, Material material, double radiance = 0,
                       bool two_sided = false);
 

@@ -30,7 +30,7 @@ double onGrid(const Spectrum& s, double nm) {
     return s[i] + (position - static_cast<double>(i)) * (s[i + 1] - s[i]);
 }
 
-/// ∫ f dλ by midpoints 0.01 nm apart, of which none is where the tables bend.
+/// ∫ f dλ by midpoints 0.01 nm apart, none of them at a node of the tables.
 template <class Function>
 double integral(double from_nm, double to_nm, const Function& f) {
     const auto steps = static_cast<int>(std::lround((to_nm - from_nm) * 100));

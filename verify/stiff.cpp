@@ -217,7 +217,7 @@ void rareEvent(Context& context) {
     const Film none = context.render(scene, {.samples = 16, .seed = 5});
     context.holds("no hit among 256 paths: the error is unknown", radiance(none) > 0 || !estimateError(none),
                   "no estimate",
-                  "a black image claims to be exact: whoever stops by its error estimate stops at once");
+                  "a black image claims to be exact: a render bounded by its error stops at once");
     if (!context.atLeast(Level::Merge)) return;
     // With hits, the estimate of the error must cover the error.
     const Film some = context.render(scene, {.samples = 1u << 22, .seed = 5});

@@ -1,4 +1,4 @@
-// Group H, the part about values that depend on the place: what is seen of a textured surface in constant
+// Group H, the part about values that depend on the place: the radiance of a textured surface in constant
 // light is the reflectance at that place.
 #include "base/temporary_folder.h"
 #include "film/resolve.h"
@@ -137,7 +137,7 @@ void textureLookUps(Context& context) {
 }
 
 void textureColours(Context& context) {
-    // Codes of an image, and what is seen of them under D65.
+    // Codes of an image, and their colours under D65.
     const TemporaryFolder folder;
     const std::string path = folder.path() + "/codes.png";
     try {

@@ -73,7 +73,7 @@ void airy(Context& context) {
                         ++asked;
                     }
     context.absolute(fmt::format("{} films: the worst difference, {}", asked, where), worst, 0, 2e-4);
-    // What an eye sees of them.
+    // The films as a camera sees them.
     const auto ratio = [](const std::vector<Film>& f) { return luminance(f[0]) / luminance(f[1]); };
     const Effort effort{.samples = 4096, .most = 65536};
     for (const double degrees : {0.0, 60.0})
@@ -103,7 +103,7 @@ void airy(Context& context) {
                      {expected(2, under, pane), "the way within the film counts twice"}});
             }
         }
-    // relative_thickness, as a number and by the place: the same as so much thinner a film.
+    // relative_thickness, as a number and by the place: the same as a film that is thinner by this factor.
     for (const char* relative : {"0.25", "{checker: [0.25, 1], scale: 1e-3}"}) {
         const double cosine = std::cos(60 * kDegree);
         const auto expected = [&](double times) {
@@ -125,7 +125,7 @@ void airy(Context& context) {
 }
 
 void filmFurnace(Context& context) {
-    // A film takes nothing: what is clear cannot be seen, of whatever thickness the film.
+    // A film absorbs nothing: a clear body is invisible, whatever the film's thickness.
     const auto scene = [](const std::string& material, bool body) {
         Stage stage("{position: [0.2, 3, 4], target: [0.5, 0.5, 0.5], fov: 12}",
                     "{max_depth: 400, roulette: false}");

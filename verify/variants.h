@@ -26,7 +26,8 @@ void forEachVariant(Context& context, int resolution, void (*ask)(Context&, cons
 /// All AOVs of first hits.
 inline constexpr std::uint32_t kAllAovs = kAovsOfFirstHits;
 
-/// What crt's own build of the kernel gives, on one thread, in portable C++: what every backend must give.
+/// The film of crt's own build of the kernel, on one thread, in portable C++. Every backend must give the
+/// same.
 Film portableFilm(const Scene& scene, const Render& how);
 
 }  // namespace crt::verify

@@ -192,18 +192,17 @@ def measure(program, arguments):
     results.paragraph(
         f"Scenes of `{FOLDER}`, translated by `bench/crtbench/agree_scene.py`, rendered {renders} times by "
         f"crt on `{backend}` and by Mitsuba {mi.__version__} (`{arguments.variant}`) with {samples} samples "
-        f"a pixel and seeds of their own. *Mean*: luminance of Mitsuba's image over that of crt's, less "
+        f"a pixel and separate seeds. *Mean*: luminance of Mitsuba's image over that of crt's, less "
         f"one, with its 95 % interval. It agrees when two one-sided tests at 95 % put it within "
         f"{MARGIN:.1%}. *Worst tile*: the largest difference in one of {TILES} × {TILES} tiles after that "
         f"common factor, in units of the image's mean. *Excess*: what is beyond {MARGIN:.1%} of it, in "
         f"standard errors; chance gives up to {bound:.2f} in one of {TILES * TILES} tiles at 95 %. Both "
-        "programs have tables of the observer of their own, which alone make 0.1 %."
+        "programs have different tables of the observer, which alone make 0.1 %."
     )
     results.table(["scene", "Mitsuba over crt, mean", "worst tile", "excess", "verdict"], rows)
     results.claim(
         "crt and Mitsuba 3 agree where their models are the same",
-        [f"{renders} renders of each scene by each program, {samples} samples per pixel, seeds of their "
-         f"own; "
+        [f"{renders} renders of each scene by each program, {samples} samples per pixel, separate seeds; "
          f"crt on `{backend}`, Mitsuba {mi.__version__} (`{arguments.variant}`). Images agree when two "
          f"one-sided "
          f"tests at 95 % put the ratio of the mean luminances within {MARGIN:.1%} of 1, and no tile of "

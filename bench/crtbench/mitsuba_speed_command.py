@@ -20,7 +20,7 @@ def options(parser):
     parser.add_argument("--samples", type=int, default=256, help="a pixel for rates (256)")
     parser.add_argument("--runs", type=int, default=5, help="for rates (5)")
     parser.add_argument("--error-size", type=int, default=256, help="pixels a side for errors (256)")
-    parser.add_argument("--renders", type=int, default=2, help="with seeds of their own for an error (2)")
+    parser.add_argument("--renders", type=int, default=2, help="with separate seeds, for an error (2)")
     parser.add_argument("--target", type=float, default=0.01, help="error to reach, of the mean (0.01)")
     parser.add_argument("--most", type=int, default=16384, help="samples a pixel to give up after (16384)")
     parser.add_argument(

@@ -283,7 +283,7 @@ def measure(program, arguments):
         f"the program's own converged image, of {arguments.renders} renders, by samples a pixel. *Last*: "
         "the median of a render alone of the last number, scene loaded and kernels compiled. "
         f"*To {target}*: interpolated between the last two numbers. crt with Sobol points in one sequence, "
-        "or in two (its default, by which the image knows its error); Mitsuba with each of its samplers "
+        "or in two (its default, which gives the error of the image); Mitsuba with each of its samplers "
         f"that is named. Both had {processors} processors; others used {share:.0%} of the machine."
     )
     results.table(["Scene", "Contestant", "Errors", "Last", f"To {target}"], rows)

@@ -40,7 +40,7 @@ def options(parser):
         help="of Mitsuba; each is a contestant (independent multijitter ldsampler)",
     )
     parser.add_argument("--size", type=int, default=96, help="of the images, in pixels a side (96)")
-    parser.add_argument("--renders", type=int, default=4, help="with seeds of their own a point (4)")
+    parser.add_argument("--renders", type=int, default=4, help="with separate seeds, per point (4)")
     parser.add_argument("--target", type=float, default=0.01, help="error to reach, of the mean (0.01)")
     parser.add_argument(
         "--most", type=int, default=16384, help="samples a pixel after which a contestant gives up (16384)"

@@ -20,9 +20,9 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 FOLDERS = ("bench", "core", "docs", "plugins", "python", "scripts", "tests", "verify")
 PAGES = ("README.md", "CONTRIBUTING.md")
 # Texts that a user sees: strings of these folders, except of tests.
-SEEN = ("core", "plugins", "python/crt", "python/src")
-# With separate bounds, which may only fall; docs/stability.md is made from verify.
-LATER = {"core/kernel": 107, "verify": 64, "docs/results": 7, "docs/stability.md": 1}
+SEEN = ("core", "plugins", "python/crt", "python/src", "verify")
+# With separate bounds, which may only fall. In core/kernel a string of features.h is left.
+LATER = {"core/kernel": 1}
 COMMENTS = 0
 # The rules quote what they forbid.
 QUOTES = {"CONTRIBUTING.md", "tests/rooms/check_language.py", "tests/rooms/test_language.py"}

@@ -13,8 +13,8 @@ CRT_KERNEL_BEGIN
 
 /* Offset from the pixel centre of the uniform number u, increasing. The share of the filter that is farther
    from the middle, `beyond`, finds its cell by exponent and leading bits, so that cells are as fine in the
-   tail, where a factor of two is a small way, as in the middle. What is rarer than a number of 24 bits can
-   be takes the last node. */
+   tail, where a factor of two is a small way, as in the middle. A share too small for a number of 24 bits
+   takes the last node. */
 CRT_FN f32 crt_filter_offset(const CrtContext *ctx, f32 u) {
     CRT_GLOBAL const f32 *table = CRT_ARRAY(f32, ctx->blob, ctx->scene->filter);
     const f32 beyond = 2.0f * (u < 0.5f ? u : 1.0f - u);

@@ -3,8 +3,8 @@
  * changes: in the light transport, in elementary functions, in the sampler, in what compile.cpp writes into
  * the scene. Adding what no scene had before changes nothing.
  *
- * A plugin of another version is refused, and so is a film: their samples do not belong into one image. The
- * conformance suite compares films with stored hashes (tests/bits_hashes.txt), so that a change of bits
+ * A plugin of another version is refused, and so is a film: their samples must not be mixed in one image.
+ * The conformance suite compares films with stored hashes (tests/bits_hashes.txt), so that a change of bits
  * cannot go unseen; it says how to store new ones.
  *
  *   1   what carries no version

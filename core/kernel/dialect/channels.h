@@ -1,17 +1,17 @@
 /*
- * channels.h: what a film holds of each pixel and what an image can be asked for, one row each. Masks,
- * widths, the order of film channels, the members of CrtScene, the names in scene files and in EXR files are
- * all made from these rows.
+ * channels.h: the channels of a film and the outputs of an image, one row each. Masks, widths, the order of
+ * film channels, the members of CrtScene, the names in scene files and in EXR files are all made from these
+ * rows.
  *
  * CRT_CHANNEL_LIST(C) calls C(bit, NAME, Name, stem, width, SOURCE, "name in scenes", "EXR channels") for
- * what has film channels of its own, in the order in which the film holds them, after X, Y and Z. `width` is
- * their number; films of fewer replicates than there can be have fewer of those, which come last.
- * CrtScene::<stem>_channel is the first of them. SOURCE says which kernel code adds to them: FIRST_HIT has a
- * function crt_first_hit_<stem> in film.h, SAMPLES is added by crt_film_add_sample.
+ * each output that has film channels, in the order of these in the film, after X, Y and Z. `width` is their
+ * number. Replicates come last, since films may have fewer of them than `width`. CrtScene::<stem>_channel
+ * is the first of them. SOURCE says which kernel code adds to them: FIRST_HIT has a function
+ * crt_first_hit_<stem> in film.h, SAMPLES is added by crt_film_add_sample.
  *
- * CRT_PLANE_LIST(P) calls P(bit, NAME, Name, TYPE, SOURCE, "name in scenes", "EXR channels") for what has
- * none: IDS is the film's plane of primitive ids, FILM is made of the film when it is resolved. TYPE is
- * FLOAT or UINT.
+ * CRT_PLANE_LIST(P) calls P(bit, NAME, Name, TYPE, SOURCE, "name in scenes", "EXR channels") for each
+ * output without film channels: IDS is the film's plane of primitive ids, FILM is made of the film when it
+ * is resolved. TYPE is FLOAT or UINT.
  *
  * A spectral film has its bins and the responses of its sensors behind all of these: CrtSpectralFilm.
  *
@@ -38,7 +38,8 @@
 #define CRT_PLANE_ENUM(bit, NAME, Name, TYPE, SOURCE, name, exr) CRT_AOV_##NAME = 1 << bit,
 enum CrtAov { CRT_CHANNEL_LIST(CRT_CHANNEL_ENUM) CRT_PLANE_LIST(CRT_PLANE_ENUM) CRT_AOV_END };
 
-/* X, Y and Z of each sample. SQUARES is Y² of each, of which films without replicates know their variance.
+/* X, Y and Z of each sample. SQUARES is Y² of each, from which films without replicates estimate their
+   variance.
  */
 #define CRT_CHANNELS_BASE 3u
 

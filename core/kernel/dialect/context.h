@@ -1,5 +1,5 @@
 /*
- * context.h: what every function that reads the scene gets as its first argument.
+ * context.h: the first argument of every function that reads the scene.
  */
 #ifndef CRT_CONTEXT_H
 #define CRT_CONTEXT_H

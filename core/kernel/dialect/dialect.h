@@ -64,7 +64,8 @@ CRT_FN u32 crt_reverse_bits(u32 x) {
 /* min, max and select lane by lane; a < b ? a : b, so that a NaN in `a` yields b. */
 CRT_FN vec4 crt_min4(vec4 a, vec4 b) { return select(b, a, a < b); }
 CRT_FN vec4 crt_max4(vec4 a, vec4 b) { return select(b, a, a > b); }
-/* The same for what only culls: of 0 and −0 either may come. A NaN in `a` yields b, which is none. */
+/* The same for tests that only cull: of 0 and −0 it may return either. A NaN in `a` yields b, which is no
+   NaN. */
 #define crt_cull_min(a, b) fmin((float)(a), (float)(b))
 #define crt_cull_max(a, b) fmax((float)(a), (float)(b))
 #define crt_cull_min4(a, b) crt_min4(a, b)
@@ -101,9 +102,10 @@ CRT_FN u32 mask8_bits(mask8 m) {
 
 #define CRT_FN static __device__ inline
 #define CRT_HOT_FN CRT_FN
-#define CRT_CALLED_FN CRT_FN /* a call costs 0.8 % of a render, and none waits for this compiler */
-/* What many places ask for: copies of it would fill the cache of instructions, for which a kernel of many
-   materials waits more than for all else (docs/decisions/0041-instruction-cache.md). */
+#define CRT_CALLED_FN CRT_FN /* a call costs 0.8 % of a render, and users do not wait for this compiler */
+/* A function with many callers stays a call: copies of it would fill the instruction cache, and a kernel of
+   many materials waits for instructions more than for all else
+   (docs/decisions/0041-instruction-cache.md). */
 #ifdef CRT_CUDA_ON_HOST
 #define CRT_SHARED_FN CRT_FN
 #else
@@ -284,7 +286,7 @@ CRT_FN f32 crt_fma(f32 a, f32 b, f32 c) { return __builtin_fmaf(a, b, c); }
 CRT_FN f32 crt_sqrt(f32 x) { return __builtin_sqrtf(x); }
 CRT_FN f32 crt_abs(f32 x) { return __builtin_fabsf(x); }
 CRT_FN f32 crt_floor(f32 x) { return __builtin_floorf(x); }
-/* 1/x to within an ulp, and not the same on all backends: for what only culls. */
+/* 1/x to within an ulp, and not the same on all backends: for tests that only cull. */
 CRT_FN f32 crt_fast_reciprocal(f32 x) { return 1.0f / x; }
 CRT_FN u32 crt_bits(f32 x) { u32 u; std::memcpy(&u, &x, 4); return u; }
 CRT_FN f32 crt_from_bits(u32 u) { f32 x; std::memcpy(&x, &u, 4); return x; }

@@ -95,7 +95,7 @@ enum CrtMaterialType { CRT_MATERIAL_LIST(CRT_MATERIAL_ENUM, ) };
 /* The kinds of materials that it has. */
 #define CRT_KERNEL_MATERIALS ((CRT_FEATURES) & CRT_FEATURES_MATERIALS)
 
-/* Whether a mask, and whether this kernel, has a feature. */
+/* True if a mask has a feature; true if this kernel has it. */
 #define CRT_IN_MASK(mask, name) ((((mask) >> CRT_BIT_##name) & 1ul) != 0ul)
 #define CRT_HAS(name) CRT_IN_MASK(CRT_FEATURES, name)
 

@@ -51,10 +51,10 @@ CRT_ASSERT_SIZE(CrtTriangle, 48);
 
 #define CRT_SLOT_INSTANCE 0x80000000u
 
-/* A mesh in one of its places. Its triangles, in coordinates of their own, within ±1, are behind those of
-   the slots, in leaf order; their `id` is the number of their primitive, and of its texture coordinates and
-   colours. to_world makes of them triangles as others are; to_mesh takes rays to their boxes, which grow by
-   crt_instance_slack for what is rounded on the way. */
+/* An instance of a mesh. The mesh's triangles, in its own coordinates within ±1, come after those of the
+   slots, in leaf order; their `id` is the number of their primitive, and of its texture coordinates and
+   colours. to_world transforms them into the scene; to_mesh transforms rays for the tests of their boxes,
+   which grow by crt_instance_slack for the rounding of that. */
 typedef struct CrtInstance {
     f32 to_world[12]; /* rows of x, y, z: x, y, z, 1 */
     f32 to_mesh[12];
@@ -71,9 +71,9 @@ CRT_ASSERT_SIZE(CrtInstance, 128);
 #define CRT_SHAPE_DISK 1u     /* in the plane of x and y */
 #define CRT_SHAPE_CYLINDER 2u /* around z, without ends */
 
-/* A surface of the second order, in a frame of unit axes that are perpendicular to each other. What is left
-   of it is where z, in the frame, is from from_z to to_z. A rim that another surface touches has a lip: rays
-   meet the shape that much beyond it, so that none slips between the two. A lip does not shine. */
+/* A surface of the second order, in a frame of unit axes that are perpendicular to each other. It ends at
+   from_z and to_z, in the frame. A rim that another surface touches has a lip: rays meet the shape that
+   much beyond it, so that none slips between the two. A lip does not shine. */
 typedef struct CrtShape {
     f32 centre[3];
     f32 radius;
@@ -129,7 +129,7 @@ typedef struct CrtFace {
 } CrtFace;
 CRT_ASSERT_SIZE(CrtFace, 32);
 
-/* What a triangle is made of, by primitive id. */
+/* The material, light, normals and object of a triangle, by primitive id. */
 typedef struct CrtPrimitive {
     u32 material;
     u32 light;    /* index of its CrtLight, or CRT_NONE */
@@ -156,7 +156,7 @@ typedef struct CrtUvs {
 CRT_ASSERT_SIZE(CrtUvs, 32);
 
 /* Colours of the three vertices: the coefficients of a sigmoid (crt_sigmoid) each. By primitive id, where
-   the scene has values that ask for them. */
+   the scene has values that use them. */
 typedef struct CrtVertexColors {
     f32 c[9];
     f32 reserved[3];
@@ -203,7 +203,7 @@ typedef u32 CrtValue;
 #define CRT_WRAP_MIRROR 1u
 #define CRT_WRAP_CLAMP 2u
 
-/* A value that depends on the place. What a kind does not have is 0. */
+/* A value that depends on the place. Members that a kind does not use are 0. */
 typedef struct CrtTexture {
     u32 kind; /* CRT_TEXTURE_… */
     u32 width, height;
@@ -224,10 +224,10 @@ CRT_ASSERT_SIZE(CrtTexture, 64);
 /* Steps between the cosines 0 and 1 of a coat's table, which is as long as a spectrum's. */
 #define CRT_COAT_STEPS 470.0f
 
-/* What microfacets lose of light towards a view, at steps of the root of its cosine, and behind that of
-   cosine 1, which comes twice, the mean over the cosine and the share of diffuse light that the interface
-   lets in from outside. Then, at the same steps, the share of all losses, weighed by the cosine, that is
-   nearer to the surface. */
+/* The share of light towards a view that microfacets lose, at steps of the root of its cosine. Behind the
+   value of cosine 1, which comes twice, are the mean over the cosine and the share of diffuse light that
+   the interface lets in from outside. Then follows, at the same steps, the share of all losses, weighed by
+   the cosine, that is nearer to the surface. */
 #define CRT_LOSS_STEPS 123.0f
 #define CRT_LOSS_MEAN 125.0f
 #define CRT_LOSS_PASSED 126.0f
@@ -246,7 +246,7 @@ typedef struct CrtLoss {
 } CrtLoss;
 CRT_ASSERT_SIZE(CrtLoss, 32);
 
-/* What a kind does not have is 0. */
+/* Members that a kind does not use are 0. */
 typedef struct CrtMaterial {
     u32 type; /* CRT_MATERIAL_… of features.h */
     u32 flags;
@@ -276,7 +276,7 @@ CRT_ASSERT_SIZE(CrtMaterial, 64);
 
 #define CRT_OPAQUE 0x3f800000u /* the CrtValue 1 */
 
-/* How a material is composed, by its number. Only in scenes in which one is. */
+/* The composition of a material, by its number. Only scenes with a composed material have these. */
 typedef struct CrtComposition {
     u32 kind; /* CRT_COMPOSED_… */
     u32 first, second; /* materials */
@@ -288,7 +288,8 @@ typedef struct CrtComposition {
 } CrtComposition;
 CRT_ASSERT_SIZE(CrtComposition, 32);
 
-/* What a material has besides its CrtMaterial, by its number. Only in scenes in which one has something. */
+/* Further properties of a material besides its CrtMaterial, by its number. Only scenes with a material that
+   has some hold these. */
 typedef struct CrtLayers {
     CrtValue base_loss;  /* plastic with a rough base: what one reflection by it loses, by the cosine, of
                             what it would send back where that is most: a table; 0: Lambert's law */
@@ -320,7 +321,7 @@ CRT_ASSERT_SIZE(CrtLayers, 64);
 #define CRT_LIGHT_IES 7u
 #define CRT_LIGHT_DISK_BEAM 8u
 #define CRT_LIGHT_SLIT_BEAM 9u
-#define CRT_LIGHT_SHAPE 10u /* a sphere, a disk, a cylinder, or what is left of one */
+#define CRT_LIGHT_SHAPE 10u /* a sphere, a disk, a cylinder, or a part of one */
 
 #define CRT_LIGHT_TWO_SIDED 1u
 #define CRT_LIGHT_UNSAMPLED 2u /* left to scattered rays: its surface is not all there */
@@ -355,7 +356,7 @@ typedef struct CrtLightNode {
 #define CRT_LIGHT_LEAF 0x80000000u
 CRT_ASSERT_SIZE(CrtLightNode, 224);
 
-/* How the light of an IES file is distributed, or what a beam's section is. */
+/* The distribution of an IES light, or the section of a beam. */
 typedef struct CrtLightForm {
     f32 u[3];           /* IES: where the horizontal angle 0 is; slit: across; unit, like v perpendicular to
                            the light's direction */
@@ -369,8 +370,8 @@ typedef struct CrtLightForm {
 } CrtLightForm;
 CRT_ASSERT_SIZE(CrtLightForm, 64);
 
-/* What a light without a surface has besides its CrtLight, whose `radiance` is a spectrum that `strength`
-   multiplies. Suns come first. */
+/* The properties of a light without a surface besides its CrtLight, whose `radiance` is a spectrum that
+   `strength` multiplies. Suns come first. */
 typedef struct CrtPointLight {
     f32 position[3];      /* point, spot, IES; beam: middle of the section that it begins with */
     f32 strength;         /* point, spot (on its axis), IES (where it is greatest): radiant intensity, by
@@ -403,8 +404,8 @@ typedef struct CrtEnvironmentImage {
 } CrtEnvironmentImage;
 CRT_ASSERT_SIZE(CrtEnvironmentImage, 80);
 
-/* What a film has of the spectrum, in channels behind all others: the mean radiance in equal bins of
-   wavelengths, then what the responses of sensors make of the radiance. */
+/* The spectral channels of a film, behind all others: the mean radiance in equal bins of wavelengths, then
+   the radiance weighted by the responses of sensors. */
 typedef struct CrtSpectralFilm {
     u32 channel;       /* of the first bin */
     u32 bins;
@@ -501,8 +502,8 @@ typedef struct CrtScene {
     CrtSpan materials;           /* CrtMaterial */
     CrtSpan lights;              /* CrtLight; behind them the CrtLightNode of the tree, if there is one */
     CrtSpan textures;            /* CrtTexture */
-    CrtSpan uvs;                 /* CrtUvs, by id; only where a texture or a tangent asks */
-    CrtSpan vertex_colors;       /* CrtVertexColors, by id; only where a value asks */
+    CrtSpan uvs;                 /* CrtUvs, by id; only where a texture or a tangent needs them */
+    CrtSpan vertex_colors;       /* CrtVertexColors, by id; only where a value needs them */
     CrtSpan point_lights;        /* CrtPointLight */
     CrtSpan environment_image;   /* CrtEnvironmentImage, 1 or none */
     CrtSpan compositions;        /* CrtComposition, as many as materials; or none */

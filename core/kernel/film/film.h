@@ -10,7 +10,7 @@
 
 CRT_KERNEL_BEGIN
 
-/* What the first surface that a path meets gives to AOVs. */
+/* The AOVs of the first surface that a path meets. */
 typedef struct CrtFirstHit {
     vec4 albedo; /* at the path's wavelengths */
     vec3 normal;
@@ -120,8 +120,8 @@ CRT_FN void crt_film_add_spectrum(const CrtContext *ctx, vec4 radiance, CrtWavel
                      (f64)sum4(crt_lookup4(table + k * CRT_SPECTRUM_STRIDE, position) * integral));
 }
 
-/* Adds the next sample: its colour, and what else the film holds of it. A sample that is not finite is not
-   counted either. */
+/* Adds the next sample: its colour, and its other channels. A sample that is not finite is not counted
+   either. */
 CRT_FN void crt_film_add_sample(const CrtContext *ctx, CrtFilmPixel *pixel, vec4 xyz, vec4 radiance,
                                 CrtWavelengths wavelengths, const CrtFirstHit *first) {
     CRT_GLOBAL const CrtScene *scene = ctx->scene;

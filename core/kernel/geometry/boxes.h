@@ -10,9 +10,8 @@ CRT_KERNEL_BEGIN
 
 #define CRT_BVH_STACK 96 /* three entries a level; bvh_build.cpp keeps the tree below 32 levels */
 
-/* Which of a box's two planes a ray meets first, per axis, by the sign bit, so that −0 is told from +0;
-   and
- * 1/d, infinite where d is zero. */
+/* Per axis: the plane of a box's two that a ray meets first, by the sign bit, which differs between −0 and
+   +0; and 1/d, infinite where d is zero. */
 typedef struct CrtSlab {
     u32 near_x, near_y, near_z;
     vec3 inverse;
@@ -51,8 +50,8 @@ CRT_FN f32 crt_box(CRT_GLOBAL const f32 *lower, CRT_GLOBAL const f32 *upper, Crt
     return enter <= leave * CRT_SLAB_SLACK ? enter : CRT_INFINITY;
 }
 
-/* A ray among the nodes of a tree: 1/d and, for the planes that it meets first and for the others, what
-   makes of a plane's coordinate its distance along the ray. */
+/* A ray for the tests of a tree's nodes: 1/d and, for near and far planes, the terms that turn a plane's
+   coordinate into its distance along the ray. */
 typedef struct CrtNodeRay {
     u32 near_x, near_y, near_z; /* as of CrtSlab */
     vec3 inverse, near, far;
@@ -60,20 +59,20 @@ typedef struct CrtNodeRay {
 
 #define CRT_LEAST_NORMAL 1.17549435e-38f
 
-/* 1/d. A direction of 0, which would make of planes no numbers, is as good as one of 2^-126. */
+/* 1/d. A component below 2^-126, which could give NaN, counts as 2^-126. */
 CRT_FN f32 crt_node_inverse(f32 d) {
     const f32 least = (crt_bits(d) >> 31) != 0u ? -CRT_LEAST_NORMAL : CRT_LEAST_NORMAL;
     return crt_fast_reciprocal(crt_abs(d) < CRT_LEAST_NORMAL ? least : d);
 }
 
-/* How far apart along one axis planes are to be, besides `slack`, that none is missed by rounding: planes
-   lie within 1; 1/d moves a coordinate by (1 + |o|) 2^-23 at most, and the sum, its product and the fused
-   operation by (1 + |o|) 2^-24 each. */
+/* The length by which planes must be apart along one axis, `slack` included, so that rounding misses none:
+   planes lie within 1; 1/d moves a coordinate by (1 + |o|) 2^-23 at most, and the sum, its product and the
+   fused operation by (1 + |o|) 2^-24 each. */
 CRT_FN f32 crt_node_slack(f32 o, f32 slack) {
     return crt_fma(6.0f * CRT_EPSILON, 1.0f + crt_abs(o), slack);
 }
 
-/* `slack`: lengths that the boxes are to be larger by on every side. */
+/* `slack`: the length by which boxes grow on every side. */
 CRT_FN CrtNodeRay crt_node_ray(CrtRay ray, f32 slack) {
     CrtNodeRay r;
     const u32 sx = crt_bits(V3X(ray.d)) >> 31, sy = crt_bits(V3Y(ray.d)) >> 31,
@@ -113,7 +112,7 @@ CRT_FN vec4 crt_node_distances(CRT_GLOBAL const CrtNode4 *node, CrtNodeRay ray, 
                      V4W(enter) <= V4W(leave) ? V4W(enter) : CRT_INFINITY);
 }
 
-/* What is left to be visited, and where the ray enters it. */
+/* A child that is left to visit, and the distance at which the ray enters it. */
 #define CRT_STACKED(child, t) (((u64)(child) << 32) | (u64)crt_bits(t))
 #define CRT_STACKED_CHILD(entry) ((u32)((entry) >> 32))
 #define CRT_STACKED_ENTRY(entry) crt_from_bits((u32)(entry))
@@ -171,8 +170,8 @@ CRT_FN u32 crt_enter_all(CRT_GLOBAL const CrtNode4 *node, vec4 t, u32 *stack, u3
     return size;
 }
 
-/* Boxes let NaN in, so that none is lost that is touched; those of unused children too, which lead back to
-   the root. A ray with a number that is none must not get there. */
+/* Tests of boxes accept NaN, so that they lose no box that is touched. They would accept unused children
+   too, which lead back to the root. So a ray with a NaN must not enter the tree. */
 CRT_FN int crt_is_ray(CrtRay ray) {
     const vec3 o = abs3(ray.o);
     const vec3 d = abs3(ray.d);

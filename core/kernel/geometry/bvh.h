@@ -1,6 +1,6 @@
 /*
- * bvh.h: software tracing, for backends without a tracer of their own: brute force for a handful of
- * triangles, the paper's culling by object boxes, and a four-wide BVH. Box tests only cull, conservatively;
+ * bvh.h: software tracing, for backends without their own tracer: brute force for a few triangles, the
+ * paper's culling by object boxes, and a four-wide BVH. Box tests only cull, conservatively; the test of
  * what a slot holds decides (slots.h).
  */
 #ifndef CRT_BVH_H
@@ -36,8 +36,8 @@ CRT_FN CrtHit crt_brute_force_closest(const CrtContext *ctx, CrtRay ray) {
     return best;
 }
 
-/* For a segment between two points of the scene: triangles that have the whole scene on one side cannot come
- * between, and are not asked. */
+/* For a segment between two points of the scene: triangles that have the whole scene on one side cannot
+ * come between, and are not tested. */
 CRT_FN int crt_brute_force_any(const CrtContext *ctx, CrtRay ray, CrtPassable *passable) {
     CRT_GLOBAL const CrtTriangle *triangles = CRT_ARRAY(CrtTriangle, ctx->blob, ctx->scene->triangles);
 #if CRT_SIMD8
@@ -132,8 +132,8 @@ CRT_FN CrtHit crt_bvh_closest(const CrtContext *ctx, CrtRay ray) {
             crt_test_leaf(ctx, triangles, current, ray, shear, &best);
         }
 #else
-        /* Boxes until there is a leaf, then its triangles: the lanes of a warp do the same together (Aila
-           and Laine 2009, "while-while"). */
+        /* Visits boxes until it finds a leaf, then tests its triangles, so that the lanes of a warp do the
+           same together (Aila and Laine 2009, "while-while"). */
         while ((current & 15u) == 0u) {
             if (crt_enter_node(nodes, among, best.t, stack, &size, &current)) continue;
             if (!crt_next_stacked(stack, &size, best.t, &current)) return best;
@@ -211,7 +211,7 @@ CRT_FN int crt_software_any(const CrtContext *ctx, CrtRay ray, CrtPassable *pass
     return 0;
 }
 
-/* The two hooks: the first hit, and whether something stops a shadow ray. A backend with a tracer of its own
+/* The two hooks: the first hit, and whether something stops a shadow ray. A backend with its own tracer
  * defines CRT_BACKEND_TRACE and both functions after including the kernel. */
 #ifdef CRT_BACKEND_TRACE
 CRT_FN CrtHit crt_trace_closest(const CrtContext *ctx, CrtRay ray);

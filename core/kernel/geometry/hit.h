@@ -1,6 +1,6 @@
 /*
- * hit.h: what a ray has met. How hits are found is in intersect.h and the headers that include it; readers
- * of values and materials need none of those.
+ * hit.h: the hit of a ray. intersect.h and the headers that include it find hits; the headers of values and
+ * materials need none of those.
  */
 #ifndef CRT_HIT_H
 #define CRT_HIT_H
@@ -35,7 +35,7 @@ CRT_FN u32 crt_primitive_of(const CrtContext *ctx, CrtHit hit) {
     return hit.id;
 }
 
-/* How materials are made of others, by number of the material; only where scene.compositions has some. */
+/* The compositions of materials, by number of the material; only where scene.compositions has some. */
 CRT_FN CRT_GLOBAL const CrtComposition *crt_compositions(const CrtContext *ctx) {
     return CRT_ARRAY(CrtComposition, ctx->blob, ctx->scene->compositions);
 }

@@ -1,9 +1,9 @@
 /*
- * instances.h: meshes that are stored once and placed many times. A ray goes to the boxes of the mesh in the
- * mesh's coordinates; a triangle goes to the ray in the scene's: its corners are rounded once, in a stated
- * order, and the one triangle test decides, as of every other triangle. So hits are the same bits on every
- * backend, neighbours share their corners, and what holds of triangles (offsets, watertight edges) holds of
- * these. They differ from those of the flattened scene by the rounding of corners alone.
+ * instances.h: meshes that are stored once and placed many times. A ray goes to the boxes of the mesh in
+ * the mesh's coordinates; a triangle goes to the ray in the scene's: its corners are rounded once, in a
+ * stated order, and the one triangle test decides, as of every other triangle. So hits are the same bits on
+ * every backend, neighbours share their corners, and all that holds for triangles (offsets, watertight
+ * edges) holds for these. They differ from those of the flattened scene by the rounding of corners alone.
  */
 #ifndef CRT_INSTANCES_H
 #define CRT_INSTANCES_H

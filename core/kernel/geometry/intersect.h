@@ -1,7 +1,7 @@
 /*
  * intersect.h: the one ray–triangle test that decides hit, distance and barycentrics on every backend.
- * Whatever finds candidates (BVH, eight at a time) may be sloppy as long as it misses none; this has
- * the last word.
+ * The search for candidates (BVH, eight at a time) may find too many but must not miss any; this test
+ * decides.
  *
  * Woop, Benthin, Wald 2013, "Watertight Ray/Triangle Intersection", with the edge functions as Kahan
  * differences of products: their sign is exact, so the two triangles at an edge agree without a fallback to
@@ -48,7 +48,8 @@ CRT_FN CrtShear crt_shear(CrtRay ray) {
 }
 
 /* Around boxes, in lengths after normalisation (coordinates within ±1): the triangle test accepts hits
-   whose offset from the ray is rounding, a few 2^-24; what culls must not cull what it would accept. */
+   whose offset from the ray is rounding, a few 2^-24; tests that cull must keep every triangle that it
+   would accept. */
 #define CRT_BOX_PADDING 5e-7f
 
 /* Does the ray hit the triangle at 0 < t < limit? Fills t, b1, b2. There is no least t: a ray starts far

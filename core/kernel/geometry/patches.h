@@ -1,9 +1,8 @@
 /*
- * patches.h: a handful of triangles, two at a time, for backends that take rays one by one in lanes of their
- * own. Of all patches of the scene the one that a ray enters first is found by planes and strips, without a
- * branch; the one ray–triangle test decides about its triangles alone. Where the patch found does not
- * settle it (the ray misses it by rounding, or the next one is as near by rounding), the caller tests all
- * triangles.
+ * patches.h: a few triangles, two at a time, for backends that trace each ray in its own lane. Of all
+ * patches of the scene the one that a ray enters first is found by planes and strips, without a branch; the
+ * one ray–triangle test decides about its triangles alone. Where the patch found does not settle it (the
+ * ray misses it by rounding, or the next one is as near by rounding), the caller tests all triangles.
  */
 #ifndef CRT_PATCHES_H
 #define CRT_PATCHES_H
@@ -12,9 +11,9 @@
 
 CRT_KERNEL_BEGIN
 
-/* What rounding may do to the place where a ray meets a plane: bounds, over the cosine of the two
-   (crt_patch_meeting), of a distance within the plane and of the ray's parameter. Heights and slopes have
-   errors of some ten 2^-24 of the coordinates, and what the exact test accepts beyond an edge is less. */
+/* Bounds of the rounding errors where a ray meets a plane, over the cosine of the two (crt_patch_meeting):
+   of a distance within the plane and of the ray's parameter. Heights and slopes have errors of some ten
+   2^-24 of the coordinates; the exact test accepts less than that beyond an edge. */
 typedef struct CrtPatchSlack {
     f32 across; /* lengths */
     f32 along;  /* of the ray's parameter, times the slope */
@@ -34,7 +33,7 @@ CRT_FN CrtPatchSlack crt_patch_slack(CrtRay ray) {
 /* A ray that runs along a plane to within this, in slope, squared, may lie on either side of it. */
 #define CRT_PATCH_GRAZING 9.0949470e-13f /* 2^-40 */
 
-/* Whether the ray may hit a triangle of the patch in 0 < t < reach; never 0 where crt_intersect_triangle
+/* True if the ray may hit a triangle of the patch in 0 < t < reach; never 0 where crt_intersect_triangle
    accepts one. *least: no hit of the patch is nearer. Comparisons let NaN through: a ray in the plane. */
 CRT_FN int crt_patch_meeting(CRT_GLOBAL const CrtPatch *patch, CrtRay ray, CrtPatchSlack slack, f32 reach,
                              f32 *least) {
@@ -70,7 +69,7 @@ CRT_FN int crt_patch_meeting(CRT_GLOBAL const CrtPatch *patch, CrtRay ray, CrtPa
     return met;
 }
 
-/* The hit of a ray with a handful of triangles; 0 where they all have to be tested. */
+/* Finds the hit of a ray with a few triangles. Returns 0 where all of them have to be tested. */
 CRT_FN int crt_patches_closest(CRT_GLOBAL const CrtPatch *patches, u32 count,
                                CRT_GLOBAL const CrtTriangle *triangles, CrtRay ray, CrtHit *best) {
     const CrtPatchSlack slack = crt_patch_slack(ray);
@@ -93,7 +92,8 @@ CRT_FN int crt_patches_closest(CRT_GLOBAL const CrtPatch *patches, u32 count,
     return best->slot == CRT_NONE ? next == CRT_INFINITY : best->t < next;
 }
 
-/* Whether a handful of triangles stops a ray: 0 or 1; 2 where they all have to be tested. */
+/* Returns 1 if one of a few triangles stops a ray, 0 if none does, and 2 where all of them have to be
+   tested. */
 CRT_FN u32 crt_patches_any(CRT_GLOBAL const CrtPatch *patches, u32 count,
                            CRT_GLOBAL const CrtTriangle *triangles, CrtRay ray) {
     const CrtPatchSlack slack = crt_patch_slack(ray);

@@ -27,7 +27,8 @@ CRT_FN int crt_has_panes(const CrtContext *ctx) {
     return CRT_HAS(THIN_DIELECTRIC) && CRT_IN_MASK(ctx->scene->features, THIN_DIELECTRIC);
 }
 
-/* In a scene with panes: whether a ray may pass what it meets, or meets a mix. crt_passes decides. */
+/* In a scene with panes: true if a ray may pass the surface that it meets, or meets a mix. crt_passes
+   decides. */
 CRT_FN int crt_may_pass(const CrtContext *ctx, CrtHit hit) {
     const u32 material =
         CRT_ARRAY(CrtPrimitive, ctx->blob, ctx->scene->primitives)[crt_primitive_of(ctx, hit)].material;

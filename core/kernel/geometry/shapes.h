@@ -2,11 +2,11 @@
  * shapes.h: rays and the surfaces of the second order: spheres and parts of them, disks, cylinders. Like
  * intersect.h this decides hit, distance and place on every backend.
  *
- * The discriminant is that of the ray's nearest point to the centre, not b² − ac, and the root that loses
- * its digits comes from the product of both (Haines, Günther, Akenine-Möller 2019, "Precision Improvements
- * for Ray/Sphere Intersection"). A hit says its place on the surface itself, not on the ray: two numbers b1
- * and b2, from which the position is made anew, so that it is off the surface by rounding alone, however
- * far the ray came.
+ * The discriminant is that of the ray's nearest point to the centre, not b² − ac, and the root that
+ * loses its digits comes from the product of both (Haines, Günther, Akenine-Möller 2019, "Precision
+ * Improvements for Ray/Sphere Intersection"). A hit stores its place on the surface itself, not on the ray:
+ * two numbers b1 and b2. The position is computed from these, so that it is off the surface by rounding
+ * alone, however far the ray came.
  */
 #ifndef CRT_SHAPES_H
 #define CRT_SHAPES_H
@@ -15,12 +15,12 @@
 
 CRT_KERNEL_BEGIN
 
-/* How far along its normal a ray must start that leaves a shape, whose position has coordinates up to
-   `coordinate`: 2 · 2^-24 · coordinate a component for the sums that make the position and the origin, and
-   as much again where the ray is grazing. `size` is the radius, and the length along the axis where there is
-   one: the position's direction from the centre errs by 2.5 · 2^-24, the difference to the centre that the
-   next ray's test takes by 1, its square by 1.5, the discriminant by 3.5. √3: all are per axis. Measured:
-   tests/unit_shapes.cpp. */
+/* The distance along the normal at which a ray must start that leaves a shape, from a position with
+   coordinates up to `coordinate`: 2 · 2^-24 · coordinate a component for the sums that make the position
+   and the origin, and as much again where the ray is grazing. `size` is the radius, and the length along
+   the axis where there is one: the position's direction from the centre errs by 2.5 · 2^-24, the
+   difference to the centre that the next ray's test takes by 1, its square by 1.5, the discriminant by 3.5.
+   √3: all are per axis. Measured: tests/unit_shapes.cpp. */
 CRT_FN f32 crt_shape_clearance(f32 coordinate, f32 size) {
     return 1.7320509f * (coordinate * CRT_GAMMA(4.0f) + size * CRT_GAMMA(16.0f));
 }

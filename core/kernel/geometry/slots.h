@@ -9,10 +9,10 @@
 
 CRT_KERNEL_BEGIN
 
-/* Whether slots may hold something else than triangles. */
+/* True if slots may hold instances or shapes besides triangles. */
 #define CRT_HAS_SLOTS (CRT_HAS(SHAPES) || CRT_HAS(INSTANCES))
 
-/* crt_test_closest of whatever is in the slot. */
+/* crt_test_closest of the triangle, shape or instance in the slot. */
 CRT_FN void crt_test_slot(const CrtContext *ctx, CRT_GLOBAL const CrtTriangle *triangles, u32 slot,
                           CrtRay ray, CrtShear shear, CrtHit *best) {
     u32 shape = 0u;

@@ -33,10 +33,10 @@ CRT_FN vec3 crt_corner(const CrtContext *ctx, CRT_GLOBAL const CrtTriangle *tria
 #define CRT_EDGE_MARGIN 4e-6f
 #define CRT_EDGE_MARGIN_MAX 0.125f
 
-/* How far off its plane a ray must start that leaves a triangle with coordinates up to `coordinate` and
-   edges up to `size`. A position is the sum of nine rounded operations a term (PBRT 4e, 6.8.5, and two for
-   b0); the test that the new ray meets shears the triangle along the ray, so that its size in every axis
-   counts. √3: both are per axis. */
+/* The distance off its plane at which a ray that leaves a triangle must start. The triangle has coordinates
+   up to `coordinate` and edges up to `size`. A position is the sum of nine rounded operations a term (PBRT
+   4e, 6.8.5, and two for b0); the test that the new ray meets shears the triangle along the ray, so that
+   its size in every axis counts. √3: both are per axis. */
 CRT_FN f32 crt_clearance(f32 coordinate, f32 size) {
     return 1.7320509f * (coordinate * CRT_GAMMA(9.0f) + size * CRT_TEST_ERROR);
 }
@@ -49,9 +49,9 @@ CRT_FN f32 crt_height_slack(f32 coordinate, f32 size) {
     return CRT_HEIGHT_SCALE * (CRT_GAMMA(1.0f) * coordinate + CRT_GAMMA(8.0f) * size) - 64.0f * CRT_EPSILON;
 }
 
-/* How far from its edges, in barycentrics, a path may start: a few ulp of the position against the
-   triangle's height. A start in a corner within rounding of the other wall might lie behind that wall, and
-   leave a closed room. */
+/* The least distance from its edges, in barycentrics, at which a path may start on a triangle: a few ulp of
+   the position against the triangle's height. A start in a corner within rounding of the other wall might
+   lie behind that wall, and leave a closed room. */
 CRT_FN f32 crt_edge_margin(f32 coordinate, f32 size, f32 twice_area) {
     const f32 rounding = 16.0f * CRT_EPSILON * (coordinate + size) * size;
     return rounding < CRT_EDGE_MARGIN_MAX * twice_area
@@ -69,8 +69,8 @@ CRT_FN vec3 crt_in_frame(CRT_GLOBAL const CrtShape *shape, vec3 v) {
 }
 
 /* Texture coordinates of the place q of a shape's frame. Around the axis u grows from 0 at x to 1; v from 0
-   at a sphere's lower pole to 1 at the upper, whatever is left of it; along a cylinder from end to end. On a
-   disk they are those of the square around it. */
+   at a sphere's lower pole to 1 at the upper, however much of it is left; along a cylinder from end to end.
+   On a disk they are those of the square around it. */
 CRT_FN void crt_shape_uv(CRT_GLOBAL const CrtShape *shape, vec3 q, f32 *u, f32 *v) {
     const f32 x = V3X(q), y = V3Y(q), z = V3Z(q);
     if (shape->kind == CRT_SHAPE_DISK) {
@@ -85,7 +85,7 @@ CRT_FN void crt_shape_uv(CRT_GLOBAL const CrtShape *shape, vec3 q, f32 *u, f32 *
              : crt_fma(crt_atan2(z, crt_sqrt(crt_fma(x, x, y * y))), CRT_INV_PI, 0.5f);
 }
 
-/* How the place q moves with u and with v, in the scene's axes. */
+/* The derivatives of the place q by u and by v, in the scene's axes. */
 CRT_FN void crt_shape_edges(CRT_GLOBAL const CrtShape *shape, vec3 q, vec3 *along_u, vec3 *along_v) {
     const vec3 ex = crt_load3(shape->x), ey = crt_load3(shape->y), ez = crt_load3(shape->z);
     const f32 x = V3X(q), y = V3Y(q), z = V3Z(q);
@@ -100,10 +100,11 @@ CRT_FN void crt_shape_edges(CRT_GLOBAL const CrtShape *shape, vec3 q, vec3 *alon
     }
 }
 
-/* How far along its normal a ray must start that leaves a disk at p, b1 x + b2 y from its centre, in the
-   frame: as crt_shape_clearance, which holds for all of it, but by what is rounded at p. What is rounded in
-   an axis moves the height over the plane by the normal's part in that axis, so that a disk along two axes
-   is left from as near as its height is known, however large it is. */
+/* The distance along the normal at which a ray that leaves a disk at p must start; p is b1 x + b2 y from
+   the centre, in the frame. It is at most `whole`, the crt_shape_clearance of the whole disk, and counts
+   the rounding at p alone. Rounding in an axis moves the height over the plane by the normal's part in that
+   axis. So rays leave a disk along two axes from a distance that depends on the precision of its height,
+   not on its size. */
 CRT_FN f32 crt_disk_clearance(CRT_GLOBAL const CrtShape *shape, vec3 p, f32 b1, f32 b2, f32 whole) {
     const vec3 summands = abs3(p) + abs3(crt_load3(shape->centre)) + abs3(crt_load3(shape->x) * b1) +
                           abs3(crt_load3(shape->y) * b2);
@@ -111,8 +112,8 @@ CRT_FN f32 crt_disk_clearance(CRT_GLOBAL const CrtShape *shape, vec3 p, f32 b1, 
                                   CRT_DISK_LEAST_CLEARANCE * whole));
 }
 
-/* crt_surface of a shape. Places near its edges are drawn in from them, as those of triangles are: what is
-   within rounding of an edge may lie behind the shape that begins there. */
+/* crt_surface of a shape. Places near its edges are moved inwards, as on triangles: a place within rounding
+   of an edge may lie behind the shape that begins there. */
 CRT_FN CrtSurface crt_shape_surface(const CrtContext *ctx, CRT_GLOBAL const CrtShape *shape, CrtHit hit) {
     CRT_GLOBAL const CrtPrimitive *primitive =
         CRT_ARRAY(CrtPrimitive, ctx->blob, ctx->scene->primitives) + hit.id;
@@ -166,7 +167,8 @@ CRT_FN CrtSurface crt_shape_surface(const CrtContext *ctx, CRT_GLOBAL const CrtS
 
 CRT_FN f32 crt_largest(vec3 v) { return crt_max(V3X(v), crt_max(V3Y(v), V3Z(v))); }
 
-/* The plane of a triangle of an instance: what CrtFace has of others, from the same rules. */
+/* The plane of a triangle of an instance: the values that CrtFace holds for other triangles, by the same
+   rules. */
 CRT_FN CrtFace crt_placed_face(const CrtContext *ctx, CRT_GLOBAL const CrtTriangle *triangle, u32 instance) {
     const vec3 o = crt_corner(ctx, triangle, instance, 0u);
     const vec3 p = crt_corner(ctx, triangle, instance, 1u), q = crt_corner(ctx, triangle, instance, 2u);
@@ -253,7 +255,7 @@ CRT_FN CrtSurface crt_surface(const CrtContext *ctx, CrtHit hit) {
                  crt_fma3(crt_placed_normal(ctx, hit.instance, make_vec3(n->n[1], n->n[4], n->n[7])), b1,
                           crt_placed_normal(ctx, hit.instance, make_vec3(n->n[2], n->n[5], n->n[8])) * b2));
         const f32 length = length3(ns);
-        /* Opposite normals can cancel: then the geometric one stands. */
+        /* Opposite normals can cancel: then the geometric one is used. */
         if (length > 1e-6f) {
             s.ns = ns / length;
             if (dot3(s.ns, s.ng) < 0.0f) s.ns = -s.ns;
@@ -262,7 +264,7 @@ CRT_FN CrtSurface crt_surface(const CrtContext *ctx, CrtHit hit) {
     return s;
 }
 
-/* Of a place p on a shape: how it moves with u and with v, in place of a triangle's edges. */
+/* The derivatives by u and by v at a place p on a shape, in place of a triangle's edges. */
 CRT_FN void crt_edges_of_shape(const CrtContext *ctx, CRT_GLOBAL const CrtTriangle *triangle, vec3 p,
                                vec3 *along_u, vec3 *along_v) {
     CRT_GLOBAL const CrtShape *shape = crt_shape_of(ctx, triangle->shape - 1u);

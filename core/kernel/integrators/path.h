@@ -1,7 +1,7 @@
 /*
  * path.h: one sample of one pixel. The value of sample s of pixel p depends on (scene, seed, p, s) alone.
  *
- * A path is advanced vertex by vertex, so that a backend may schedule vertices as it likes.
+ * A path is advanced vertex by vertex, so that each backend chooses the schedule of vertices.
  */
 #ifndef CRT_PATH_H
 #define CRT_PATH_H

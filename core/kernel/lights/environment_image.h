@@ -1,7 +1,7 @@
 /*
  * environment_image.h: an image around the scene. Its texels are even in radiance. Light sampling chooses
- * one by its radiance times its solid angle, a row and then a column, and a direction within it; rays that
- * meet nothing ask for the density of theirs.
+ * one by its radiance times its solid angle, a row and then a column, and a direction within it; for rays
+ * that meet nothing, crt_environment_pdf gives the density of their direction.
  */
 #ifndef CRT_ENVIRONMENT_IMAGE_H
 #define CRT_ENVIRONMENT_IMAGE_H
@@ -15,7 +15,7 @@ CRT_FN CRT_GLOBAL const CrtEnvironmentImage *crt_environment_image(const CrtCont
     return CRT_ARRAY(CrtEnvironmentImage, ctx->blob, ctx->scene->environment_image);
 }
 
-/* Where a direction lies in the image. */
+/* The place of a direction in the image. */
 typedef struct CrtEnvironmentPlace {
     u32 row, column;
     f32 sine; /* of its angle with the image's axis */
@@ -57,7 +57,8 @@ CRT_FN u32 crt_chosen(CRT_GLOBAL const u32 *first, u32 count, u32 u) {
     return index;
 }
 
-/* How many of 2^32 numbers choose an item: less than all, since each item has one. */
+/* The number of the 2^32 random values that choose an item: less than all, since each item has at least
+   one. */
 CRT_FN f32 crt_share(CRT_GLOBAL const u32 *first, u32 count, u32 index) {
     const u32 end = index + 1u < count ? first[index + 1u] : 0u;
     return (f32)(end - first[index]);
@@ -81,8 +82,8 @@ CRT_FN f32 crt_environment_density(const CrtContext *ctx, CrtEnvironmentPlace pl
     return row * column * ((f32)image->width * (f32)image->height) / extent;
 }
 
-/* A direction of the image, and its texel: near an edge, where rounding would look its neighbour up, the one
-   that was chosen. */
+/* A direction of the image, and its texel: the one that was chosen, also near an edge, where a look-up
+   could round to the neighbour. */
 CRT_FN vec3 crt_environment_direction(const CrtContext *ctx, CrtRandom2 u, CrtEnvironmentPlace *place) {
     CRT_GLOBAL const CrtEnvironmentImage *image = crt_environment_image(ctx);
     CRT_GLOBAL const u32 *rows = CRT_ARRAY(u32, ctx->blob, image->rows);
@@ -91,7 +92,7 @@ CRT_FN vec3 crt_environment_direction(const CrtContext *ctx, CrtRandom2 u, CrtEn
     const u32 row = crt_chosen(rows, image->height, u_row);
     CRT_GLOBAL const u32 *columns = crt_environment_columns(ctx, image, row);
     const u32 column = crt_chosen(columns, image->width, u_column);
-    /* What is left of the numbers says where in the texel. */
+    /* The rest of each number gives the place in the texel. */
     const f32 in_row = (f32)(u_row - rows[row]) / crt_share(rows, image->height, row);
     const f32 in_column = (f32)(u_column - columns[column]) / crt_share(columns, image->width, column);
     const f32 theta = ((f32)row + in_row) * (CRT_PI / (f32)image->height);

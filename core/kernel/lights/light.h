@@ -1,9 +1,9 @@
 /*
  * light.h: sampling the lights: crt_light_choose, then crt_light_sample and crt_light_pdf for emitters,
- * crt_environment_sample and crt_environment_pdf for what lies around. One emissive triangle, or two that
- * make a parallelogram, is one light, chosen by power, and so is the environment where the scene asks for
- * it. How a point on it is found is decided by the shaded point and the light alone, in crt_light_view,
- * which sampling and the pdf both ask: uniformly in solid angle where it is seen large, else uniformly on
+ * crt_environment_sample and crt_environment_pdf for the environment. One emissive triangle, or two that
+ * make a parallelogram, is one light, chosen by power, and so is the environment in scenes that request
+ * this. crt_light_view decides how a point on a light is sampled, by the shaded point and the light alone,
+ * for both sampling and the pdf: uniformly in solid angle where the light looks large, else uniformly on
  * its area; where neither works, scattered rays alone find it.
  */
 #ifndef CRT_LIGHT_H
@@ -19,7 +19,7 @@ CRT_KERNEL_BEGIN
    the same variance at a fifth of the cost; above, its 1/r² and cosine make it noisy. */
 #define CRT_SOLID_ANGLE_THRESHOLD 0.3f
 
-/* A light seen as nearly a hemisphere is left to chance: scattered rays find it all but always. */
+/* A light seen as nearly a hemisphere is left to chance: scattered rays almost always find it. */
 #define CRT_SOLID_ANGLE_MAX 6.0f
 
 /* Least height over the emitter's plane, as a share of the distance to its farthest corner, at which
@@ -80,7 +80,7 @@ CRT_FN int crt_seen_large(CrtLightShape shape, vec3 p) {
 #define CRT_LIGHT_BY_SOLID_ANGLE 1u
 #define CRT_LIGHT_BY_CHANCE 2u
 
-/* How an emitter is sampled from a point, and what that takes. */
+/* The technique that samples an emitter from a point, and its inputs. */
 typedef struct CrtLightView {
     u32 technique;
     f32 height;          /* of the point over the emitter's plane, against its normal: above 0 behind it */
@@ -218,7 +218,7 @@ CRT_FN u32 crt_light_search(CRT_GLOBAL const CrtLight *lights, u32 index, u32 en
     return index;
 }
 
-/* Which light to sample, by power. There must be one. */
+/* Chooses a light to sample, by power. The scene must have a light. */
 CRT_FN u32 crt_light_choose(const CrtContext *ctx, CrtSampler *sampler, u32 dimension) {
     CRT_GLOBAL const CrtLight *lights = CRT_ARRAY(CrtLight, ctx->blob, ctx->scene->lights);
     const u32 end = ctx->scene->lights.count;
@@ -302,22 +302,22 @@ CRT_FN CrtLightSeen crt_light_pdf(const CrtContext *ctx, u32 index, vec3 p, f32 
     return seen;
 }
 
-/* The environment among the lights. Of one that is the same in every direction nothing is known but that
- * what arrives counts by its cosine with the shading normal ns, on the side of w_o: directions are sampled
- * by it. What is transmitted is left to scattered rays. Of an image they are sampled by its radiance, on
- * both sides. */
+/* The environment among the lights. If it is the same in every direction, directions are sampled by their
+ * cosine with the shading normal ns, on the side of w_o, since light counts by that cosine; scattered rays
+ * alone find light from the other side. If it has an image, directions are sampled by its radiance, on both
+ * sides. */
 typedef struct CrtEnvironmentSample {
     vec3 wi; /* unit */
     CrtEnvironmentPlace place; /* of wi */
     f32 pdf; /* per steradian, with the probability of choosing the environment; 0: none */
 } CrtEnvironmentSample;
 
-/* Whether the environment depends on the direction. */
+/* True if the environment depends on the direction. */
 CRT_FN int crt_has_environment_image(const CrtContext *ctx) {
     return CRT_HAS(ENVIRONMENT_IMAGE) && ctx->scene->environment_image.count != 0u;
 }
 
-/* Where in the environment a direction leads. */
+/* The place in the environment that a direction leads to. */
 CRT_FN CrtEnvironmentPlace crt_environment_towards(const CrtContext *ctx, vec3 d) {
     if (!crt_has_environment_image(ctx)) return crt_no_place();
     return crt_environment_place(crt_environment_image(ctx), d);

@@ -13,11 +13,11 @@ CRT_KERNEL_BEGIN
 
 /* Rounding of the cosines below: a bound that is missed by less may be met. */
 #define CRT_TREE_SLACK 1e-3f
-/* What a node has at least that may send light: bounds are never taken for nothing, but for the sides of
-   surfaces. */
+/* The least cosine that a node counts with if it may send light: its bounds never make it 0, except for the
+   sides of surfaces. */
 #define CRT_TREE_LEAST_COSINE 1e-2f
-/* What a child that may send light is chosen with at least: next to a brighter one rounding would leave it
-   nothing. */
+/* The least share of the choice for a child that may send light: next to a brighter one rounding could make
+   it 0. */
 #define CRT_TREE_LEAST_SHARE 9.5367431640625e-7f
 
 CRT_FN vec4 crt_sines_of(vec4 cosines) {
@@ -28,9 +28,9 @@ CRT_FN vec4 crt_dots(vec4 x, vec4 y, vec4 z, vec4 u, vec4 v, vec4 w) {
     return crt_fma4(x, u, crt_fma4(y, v, z * w));
 }
 
-/* What the lights of each child of a node can send to p at most, but for shadows and a factor; 0: none of
-   them lights it. `n` is the normal of a surface that scatters on its side alone; of length 0: there is none
-   such. */
+/* Upper bounds of the light that the lights of each child of a node send to p, without shadows and up to a
+   factor; 0: none of them lights p. `n` is the normal of a surface that scatters on that side alone; its
+   length is 0 where there is no such surface. */
 CRT_FN vec4 crt_light_importances(CRT_GLOBAL const CrtLightNode *node, vec3 p, vec3 n) {
     const vec4 zero = splat4(0.0f), one = splat4(1.0f);
     const vec4 dx = crt_load4(node->centre_x) - splat4(V3X(p)),
@@ -65,7 +65,8 @@ CRT_FN vec4 crt_light_importances(CRT_GLOBAL const CrtLightNode *node, vec3 p, v
                            importance * crt_max4(cos_receiver, splat4(CRT_TREE_LEAST_COSINE)));
 }
 
-/* In proportion to which the children of a node are chosen. Their sum is 0 where none of them lights p. */
+/* The children of a node are chosen in proportion to these values. Their sum is 0 where none of them lights
+   p. */
 CRT_FN vec4 crt_light_shares(CRT_GLOBAL const CrtLightNode *node, vec3 p, vec3 n) {
     const vec4 importance = crt_light_importances(node, p, n);
     const vec4 least = splat4(sum4(importance) * CRT_TREE_LEAST_SHARE);
@@ -81,7 +82,7 @@ CRT_FN int crt_has_light_tree(const CrtContext *ctx) {
     return CRT_HAS(LIGHT_TREE) && ctx->scene->tree_lights != 0u;
 }
 
-/* Of the lights in the tree that one is chosen, given that the tree is. */
+/* The probability of one of the tree's lights, given that the tree is chosen. */
 CRT_FN f32 crt_light_tree_probability(const CrtContext *ctx, u32 light, vec3 p, vec3 n) {
     CRT_GLOBAL const CrtLightNode *nodes = crt_light_nodes(ctx);
     u32 at = CRT_ARRAY(CrtLight, ctx->blob, ctx->scene->lights)[light].choice;
@@ -97,7 +98,8 @@ CRT_FN f32 crt_light_tree_probability(const CrtContext *ctx, u32 light, vec3 p, 
     }
 }
 
-/* Which light to sample; CRT_NONE: none lights p. *probability is what its own is to be multiplied by. */
+/* Chooses a light to sample; CRT_NONE: none lights p. *probability is the factor of the light's own
+   probability. */
 CRT_FN u32 crt_light_tree_choose(const CrtContext *ctx, CrtSampler *sampler, u32 dimension, vec3 p, vec3 n,
                                  f32 *probability) {
     CRT_GLOBAL const CrtLight *lights = CRT_ARRAY(CrtLight, ctx->blob, ctx->scene->lights);
@@ -120,7 +122,7 @@ CRT_FN u32 crt_light_tree_choose(const CrtContext *ctx, CrtSampler *sampler, u32
         const f64 first = (f64)V4X(shares), second = first + (f64)V4Y(shares),
                   third = second + (f64)V4Z(shares), all = third + (f64)V4W(shares);
         if (!(all > 0.0)) return CRT_NONE;
-        /* Less than `all` however it rounds, lest a child is chosen that has no share. */
+        /* Less than `all`, even rounded, so that a child without a share is never chosen. */
         const f64 last = all * 0.9999999999999998;
         const f64 place = u * all < last ? u * all : last;
         const u32 lane =

@@ -11,8 +11,8 @@
 
 CRT_KERNEL_BEGIN
 
-/* Share of the way to a light that shadow rays go: what is nearer to it than rounding tells, as the ceiling
-   on which it is put, does not hide it. */
+/* Share of the way to a light that shadow rays go: surfaces within rounding of the light, such as the
+   ceiling that it hangs on, do not hide it. */
 #define CRT_POINT_LIGHT_REACH (1.0f - 64.0f * CRT_EPSILON)
 
 /* Squared distance below which a light is in the shaded point: its square would leave single precision. */
@@ -82,7 +82,7 @@ CRT_FN f32 crt_ies_share(const CrtContext *ctx, CRT_GLOBAL const CrtPointLight *
     return lower * (1.0f - t) + upper * t;
 }
 
-/* How far along a beam p lies; 0 or less where it is not in it. */
+/* The distance of p along a beam; 0 or less where p is outside it. */
 CRT_FN f32 crt_beam_distance(const CrtContext *ctx, CRT_GLOBAL const CrtPointLight *own, int disk, vec3 p) {
     CRT_GLOBAL const CrtLightForm *form = crt_light_form(ctx, own);
     const vec3 d = p - crt_load3(own->position);

@@ -1,9 +1,9 @@
 /*
- * shape_light.h: shapes that emit, as light.h has triangles: crt_shape_light_sample and crt_shape_light_pdf.
- * A whole sphere is sampled by the cone of directions in which it is seen; what else there is uniformly on
- * its area. From inside a sphere and from its own surface, and from so near that a point's weight may exceed
- * CRT_AREA_WEIGHT_MAX, scattered rays alone find it. Which of them holds is decided by the point and the
- * light alone.
+ * shape_light.h: shapes that emit, as light.h has triangles: crt_shape_light_sample and
+ * crt_shape_light_pdf. A whole sphere is sampled by the cone of directions in which it is seen; every other
+ * shape uniformly on its area. From inside a sphere and from its own surface, and from so near that a
+ * point's weight may exceed CRT_AREA_WEIGHT_MAX, scattered rays alone find it. The point and the light
+ * alone decide which of these holds.
  */
 #ifndef CRT_SHAPE_LIGHT_H
 #define CRT_SHAPE_LIGHT_H
@@ -17,7 +17,7 @@ CRT_FN int crt_is_shape_light(const CrtContext *ctx, u32 light) {
     return CRT_ARRAY(CrtLight, ctx->blob, ctx->scene->lights)[light].kind == CRT_LIGHT_SHAPE;
 }
 
-/* How a shape is sampled from a point. */
+/* The technique that samples a shape from a point, and its inputs. */
 typedef struct CrtShapeView {
     u32 technique;        /* CRT_LIGHT_BY_… */
     vec3 towards;         /* the centre, from the point */
@@ -25,7 +25,7 @@ typedef struct CrtShapeView {
     f32 one_minus_cosine; /* by solid angle: of the cone's edge with its axis */
 } CrtShapeView;
 
-/* At most the distance of a point from a shape; q: the point, in its frame. */
+/* A lower bound of the distance of a point from a shape; q: the point, in its frame. */
 CRT_FN f32 crt_shape_distance(CRT_GLOBAL const CrtShape *shape, vec3 q) {
     const f32 z = V3Z(q);
     const f32 r = crt_sqrt(crt_fma(V3X(q), V3X(q), V3Y(q) * V3Y(q)));

@@ -1,5 +1,6 @@
 /*
- * anisotropy.h: surfaces that are rougher one way than the other, as brushed metal is: which way that is.
+ * anisotropy.h: the tangent of surfaces whose roughness depends on the direction, as that of brushed metal
+ * does.
  *
  * The tangent is the direction in which the texture coordinate u grows, or, where a triangle has none of
  * use, the direction around the axis y: that of a lathe's chisel on a piece that turns about it. Widths are

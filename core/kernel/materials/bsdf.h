@@ -1,8 +1,8 @@
 /*
  * bsdf.h: how surfaces scatter. crt_bsdf_prepare reads what a material is made of, once a vertex; then
- * crt_bsdf_sample, crt_bsdf and the flags are all that layers.h and path.h know. A material is a
- * row of CRT_MATERIAL_LIST (features.h) and a case in each of the three; deltas, which can only be sampled,
- * need none in crt_bsdf.
+ * crt_bsdf_sample, crt_bsdf and the flags are all that layers.h and path.h use. A material is a row of
+ * CRT_MATERIAL_LIST (features.h) and a case in each of the three; deltas, which can only be sampled, need
+ * none in crt_bsdf.
  */
 #ifndef CRT_BSDF_H
 #define CRT_BSDF_H
@@ -12,7 +12,7 @@
 
 CRT_KERNEL_BEGIN
 
-/* A material's type; known without looking where the kernel has only one. */
+/* A material's type: a constant where the kernel has only one. */
 #define CRT_ONLY_MATERIAL(F, bit, NAME, Name, word, scatter, text) \
     if (only == 1ul << bit) return bit;
 CRT_FN u32 crt_material_type(u32 type) {
@@ -21,8 +21,9 @@ CRT_FN u32 crt_material_type(u32 type) {
     return type;
 }
 
-/* What the material of `surface` does to light that leaves along wo. `carried`: the path's throughput, which
-   the choice between wavelengths goes by. The first vertex asks for the albedo. */
+/* Prepares the BSDF of the material of `surface`, for light that leaves along wo. `carried`: the path's
+   throughput, which weights the choice between wavelengths. `albedo`: also computes the albedo, which the
+   first vertex needs. */
 CRT_FN void crt_bsdf_prepare(const CrtContext *ctx, CrtBsdf *b, const CrtSurface *surface, vec3 wo,
                              vec4 position, vec4 carried, int albedo) {
     const CrtMaterial material = CRT_ARRAY(CrtMaterial, ctx->blob, ctx->scene->materials)[surface->material];
@@ -125,7 +126,7 @@ CRT_FN void crt_bsdf_prepare(const CrtContext *ctx, CrtBsdf *b, const CrtSurface
             break;
         case CRT_MATERIAL_THIN_DIELECTRIC:
             if (CRT_HAS(THIN_DIELECTRIC)) {
-                /* What passes is no vertex (passing.h). */
+                /* Light that passes has no vertex here (passing.h). */
                 b->flags = CRT_BSDF_REFLECTS | CRT_BSDF_DELTA;
                 crt_prepare_pane(ctx, b, &material, surface, position);
                 b->reflectance = splat4(1.0f) - crt_pane_transmittance(b, b->pane_cosine);
@@ -144,7 +145,7 @@ CRT_FN void crt_bsdf_prepare(const CrtContext *ctx, CrtBsdf *b, const CrtSurface
                 if (CRT_HAS(TABLE) && (material.coat & CRT_VALUE_REFERENCE) != 0u)
                     b->coat = CRT_ARRAY(f32, ctx->blob, ctx->scene->spectra) +
                               (material.coat & CRT_VALUE_INDEX) * CRT_SPECTRUM_STRIDE;
-                /* Of what enters, the base sends this much back through the coat. */
+                /* The share of entering light that the base sends back through the coat. */
                 vec4 returned = base * (1.0f - k) / (splat4(1.0f) - base * k);
                 if ((material.flags & CRT_MATERIAL_OPENPBR) != 0u) returned = base;
                 const f32 mirrored = crt_coat_albedo(b, dot3(wo, b->ns));
@@ -232,7 +233,7 @@ CRT_FN vec4 crt_bsdf(const CrtBsdf *b, vec3 wi, f32 *pdf) {
             break;
         case CRT_MATERIAL_ROUGH_DIELECTRIC:
             if (CRT_HAS(ROUGH_DIELECTRIC) && (b->flags & CRT_BSDF_DELTA) == 0u) {
-                /* What crt_to_its_side mirrors is not of the lobe. */
+                /* Directions that crt_to_its_side mirrors are not part of the lobe. */
                 if ((CRT_HAS(SMOOTH_NORMALS) || CRT_HAS(NORMAL_MAP)) && !crt_keeps_side(b, wi)) break;
                 return crt_rough_dielectric(b, wi, pdf);
             }

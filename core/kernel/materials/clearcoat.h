@@ -5,13 +5,13 @@
  *
  *     f = f_coat + (1 − E(θ_o)) D T^(1/μ_o + 1/μ_i) f_below,    μ² = 1 − (1 − cos²)/η²
  *
- * T is what is left of light that crosses it once straight on, μ the cosine inside. D is what is left when
- * the coat sends light back to the base again and again, of which the albedo straight on is E_b:
+ * T is the coat's transmittance straight on, μ the cosine inside. D is the darkening by light that the
+ * coat sends back to the base again and again; E_b is the base's albedo straight on:
  *
  *     D = 1 + (Δ − 1) darkening,  Δ = (1 − K) / (1 − E_b K),  K = F(θ_o) + (K_r − F(θ_o)) r_b
  *
  * with K_r what it sends back of diffuse light from below and r_b how rough the base is. A white base under
- * a coat without colour is white, smooth or rough; but the way back is not as bright as the way there.
+ * a coat without colour is white, smooth or rough; but the coat is not reciprocal.
  */
 #ifndef CRT_CLEARCOAT_H
 #define CRT_CLEARCOAT_H
@@ -26,17 +26,17 @@ CRT_KERNEL_BEGIN
 
 CRT_FN int crt_is_coated(const CrtBsdf *b) { return CRT_HAS(CLEARCOAT) && b->clear_eta > 0.0f; }
 
-/* Whether it is rough; otherwise it mirrors, and light sampling does not find what it mirrors. */
+/* True if the coat is rough; otherwise it mirrors, and light sampling does not find its reflection. */
 CRT_FN int crt_is_coat_lobe(const CrtBsdf *b) { return crt_is_coated(b) && b->clear_alpha > 0.0f; }
 
-/* How far light goes through the coat, over its thickness. */
+/* The length of light's path through the coat, over the coat's thickness. */
 CRT_FN f32 crt_clear_way(f32 cosine, f32 eta) {
     const f32 sine2 = crt_max(crt_fma(-cosine, cosine, 1.0f), 0.0f);
     const f32 cos2 = 1.0f - sine2 / (eta * eta);
     return 1.0f / crt_sqrt(crt_max(cos2, CRT_CLEAR_COS_MIN * CRT_CLEAR_COS_MIN));
 }
 
-/* What is left after that, of what is left by `depth`. */
+/* The transmittance of a path of that length through a coat of optical depth `depth`. */
 CRT_FN vec4 crt_clear_left(vec4 depth, f32 way) {
     return make_vec4(crt_exp_negative(-V4X(depth) * way), crt_exp_negative(-V4Y(depth) * way),
                      crt_exp_negative(-V4Z(depth) * way), crt_exp_negative(-V4W(depth) * way));
@@ -56,7 +56,7 @@ CRT_FN CRT_GLOBAL const CrtLayers *crt_clear_layers(const CrtContext *ctx, u32 m
     return layers->clear_ior > 0.0f ? layers : 0;
 }
 
-/* Once crt_bsdf_prepare has set what lies below, and its albedo. */
+/* Call this after crt_bsdf_prepare has set the BSDF below, and its albedo. */
 CRT_FN void crt_prepare_clearcoat(const CrtContext *ctx, CrtBsdf *b, CRT_GLOBAL const CrtLayers *layers,
                                   const CrtSurface *surface, vec4 position, int albedo) {
     const f32 eta = layers->clear_ior;
@@ -86,7 +86,7 @@ CRT_FN void crt_prepare_clearcoat(const CrtContext *ctx, CrtBsdf *b, CRT_GLOBAL 
     if (albedo) b->albedo = splat4(facing) + straight_on * once * once * b->albedo * (1.0f - facing);
 }
 
-/* What is left of what lies below, of light from w_i. */
+/* The factor of the layers below the coat, for light from w_i. */
 CRT_FN vec4 crt_through_clearcoat(const CrtBsdf *b, vec3 wi) {
     return b->clear_below * crt_clear_left(b->clear_depth, crt_clear_way(dot3(wi, b->ns), b->clear_eta));
 }

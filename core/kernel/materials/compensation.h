@@ -1,12 +1,12 @@
 /*
- * compensation.h: what microfacets lose. GGX with Smith's shadowing follows light to one microfacet; what
- * others are in the way of is lost, 1 − E(θ) of the light towards a view at θ. Here it is given back,
- * diffusely (Kulla and Conty 2017):
+ * compensation.h: what microfacets lose. GGX with Smith's shadowing follows light to one microfacet; light
+ * that other microfacets block is lost, 1 − E(θ) of the light towards a view at θ. Here it is given
+ * back, diffusely (Kulla and Conty 2017):
  *
  *     f = share · L(θ_o) L(θ_i) / (π L̄),    L = 1 − E, L̄ its mean over the cosine
  *
- * so that the furnace holds whatever the roughness, and light may go either way. L is a table by √cos, the
- * compiler of the scene's.
+ * so that the furnace holds whatever the roughness, and the sum stays reciprocal. L is a table by √cos,
+ * which the compiler of the scene makes.
  *
  * Of metals the share is F̄² (1 − M) / (1 − F̄ M), F̄ the mean of Fresnel's reflectance, M the
  * chance to be lost once more: the series of what leaves after two reflections, three, and so on (as Hoffman
@@ -23,12 +23,13 @@
 
 CRT_KERNEL_BEGIN
 
-/* Whether losses may depend on the wavelength. */
+/* True if losses may depend on the wavelength. */
 #define CRT_DIVIDES (CRT_HAS(DISPERSION) || CRT_HAS(THIN_FILM))
 
 #define CRT_LOST_AGAIN 0.76f /* M / L̄; tests/unit_microfacets.cpp */
 
-/* Which losses are read, and where: between two roughnesses where it is textured, or two azimuths. */
+/* The losses to read, and the place in them: between two roughnesses if the roughness is textured, or
+   between two azimuths. */
 typedef struct CrtLossPlace {
     f32 at;      /* along a row */
     u32 row;     /* floats from the first row to the one at or before the azimuth */
@@ -37,7 +38,7 @@ typedef struct CrtLossPlace {
 
 #define CRT_LOSS_BY_ROW (CRT_HAS(TEXTURE) || CRT_HAS(ANISOTROPY))
 
-/* What does not depend on a direction: CRT_LOSS_MEAN, CRT_LOSS_PASSED. */
+/* The place of a value that does not depend on a direction: CRT_LOSS_MEAN, CRT_LOSS_PASSED. */
 CRT_FN CrtLossPlace crt_loss_constant(const CrtBsdf *b, f32 at) {
     CrtLossPlace place;
     place.at = at;
@@ -90,9 +91,9 @@ CRT_FN vec4 crt_loss(const CrtBsdf *b, u32 side, CrtLossPlace place) {
     return lanes == 1u ? splat4(V4X(loss)) : loss;
 }
 
-/* Directions are given back by the steps of the rows, each with its share, in each by the cosine: nearly as
-   light is. Of a textured roughness the next larger row's, of several indices the first one's shares; of
-   azimuths all have those of their mean. */
+/* Directions of this light are sampled by the steps of the rows, each with its share, and within a step by
+   the cosine: nearly as the light is distributed. Of a textured roughness the next larger row's, of several
+   indices the first one's shares; of azimuths all have those of their mean. */
 CRT_FN CRT_GLOBAL const f32 *crt_loss_shares(const CrtBsdf *b, u32 side) {
     return b->losses.rows + b->losses.roughness_step + side * CRT_LOSS_STRIDE + CRT_LOSS_SHARES;
 }
@@ -167,7 +168,7 @@ CRT_FN void crt_prepare_metal_loss(CrtBsdf *b, vec4 mean) {
 }
 
 /* Sets what glass gives back, b->reflectance times L(θ_i) on this side and b->through times L'(θ_i) on
-   the other. Of the random choice the wavelengths decide by what the path carries in each. */
+   the other. The path's throughput in each wavelength weights the random choice. */
 CRT_FN void crt_prepare_glass_loss(CrtBsdf *b) {
     const u32 side = b->losses.side;
     const vec4 square = b->eta * b->eta;

@@ -1,8 +1,8 @@
 /*
  * composition.h: materials made of others.
  *
- * Of a mix, one material is chosen at each vertex, before anything else is asked of it: light sampling and
- * scattering see the same one, so that its density alone is what they weigh each other by.
+ * Of a mix, one material is chosen at each vertex, before any other use of it: light sampling and
+ * scattering see the same one, so that its density alone gives the weights of both.
  */
 #ifndef CRT_COMPOSITION_H
 #define CRT_COMPOSITION_H
@@ -12,8 +12,8 @@
 
 CRT_KERNEL_BEGIN
 
-/* The material that a ray of direction d finds on a surface. What is left of a random number after a choice
-   makes the next one. */
+/* The material that a ray of direction d finds on a surface. The rest of a random number after a choice
+   serves as the next number. */
 CRT_FN u32 crt_chosen_material(const CrtContext *ctx, const CrtSurface *surface, vec3 d, CrtSampler *sampler,
                                u32 dimension) {
     u32 material = surface->material;

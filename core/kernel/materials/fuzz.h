@@ -6,11 +6,10 @@
  *
  *     f cos θ_i = colour w E D(w_i),    D = a² cos θ_i / (π |M w_i|⁴),    M = (a 0 b; 0 a 0; 0 0 1)
  *
- * with x in the plane of w_o; w is the share of the surface that it lies on. What lies below gets the rest,
- * 1 − w E, as the specification scales layers by their albedo: light that comes in through the fuzz is not
- * scaled once more on its way. So a white surface under white fuzz is white, and never brighter; but the
- * way back is not as bright as the way there, of the layer as of its lobe. Seen from inside a body there is
- * no fuzz.
+ * with x in the plane of w_o; w is the share of the surface that it lies on. The layers below get the rest,
+ * 1 − w E, as the specification scales layers by their albedo: light that comes in through the fuzz is
+ * not scaled once more on its way. So a white surface under white fuzz is white, and never brighter; but
+ * neither the layer nor its lobe is reciprocal. Seen from inside a body there is no fuzz.
  */
 #ifndef CRT_FUZZ_H
 #define CRT_FUZZ_H
@@ -34,7 +33,7 @@ CRT_FN f32 crt_fuzz_albedo(f32 x, f32 y) {
     return crt_max(crt_exp_negative(-0.5f * away * away) / (s * 2.50662827f) + o, 0.0f);
 }
 
-/* Once crt_bsdf_prepare has set what lies below. */
+/* Call this after crt_bsdf_prepare has set the BSDF below. */
 CRT_FN void crt_prepare_fuzz(const CrtContext *ctx, CrtBsdf *b, const CrtSurface *surface, vec4 position,
                              int albedo) {
     b->fuzz_albedo = 0.0f;
@@ -58,7 +57,7 @@ CRT_FN void crt_prepare_fuzz(const CrtContext *ctx, CrtBsdf *b, const CrtSurface
     }
 }
 
-/* Unit, from the normal towards the viewer; any direction where he looks along it. */
+/* Unit, from the normal towards the viewer; any direction where the view is along it. */
 CRT_FN vec3 crt_fuzz_axis(const CrtBsdf *b) {
     const vec3 off = b->wo - b->ns * dot3(b->wo, b->ns);
     const f32 length = length3(off);

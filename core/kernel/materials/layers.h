@@ -1,6 +1,6 @@
 /*
- * layers.h: a BSDF with what lies on it, fuzz (fuzz.h) over a coat (clearcoat.h): what normal_map.h and
- * shade.h ask.
+ * layers.h: a BSDF with its layers, fuzz (fuzz.h) over a coat (clearcoat.h). normal_map.h and shade.h use
+ * these functions.
  */
 #ifndef CRT_LAYERS_H
 #define CRT_LAYERS_H
@@ -11,7 +11,7 @@
 
 CRT_KERNEL_BEGIN
 
-/* Whether light sampling finds nothing of it. */
+/* True if light sampling cannot find any of the scattered light. */
 CRT_FN int crt_is_delta(const CrtBsdf *b) {
     return (b->flags & CRT_BSDF_DELTA) != 0u && !crt_is_fuzzy(b) && !crt_is_coat_lobe(b);
 }

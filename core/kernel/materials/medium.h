@@ -15,8 +15,8 @@
  * list; their back faces restore them. Surfaces with holes differ: a ray inside such a body whose list
  * lacks the medium came in through a hole, is in no glass, and leaves as freely (passing.h).
  *
- * Media that absorb equally share a number, unless their surfaces have holes: paths need not tell them
- * apart.
+ * Media that absorb equally share a number, unless their surfaces have holes: paths need not distinguish
+ * them.
  */
 #ifndef CRT_MEDIUM_H
 #define CRT_MEDIUM_H
@@ -83,7 +83,7 @@ CRT_FN u32 crt_medium_before(const CrtContext *ctx, const CrtSurface *surface, v
                                                                  : crt_first_medium(ctx, media);
 }
 
-/* Whether the surface of another body coincides with it. */
+/* True if the surface of another body coincides with the hit surface. */
 CRT_FN int crt_touches(const CrtContext *ctx, CrtHit hit) {
     const u32 primitive = crt_primitive_of(ctx, hit);
     return (CRT_ARRAY(CrtPrimitive, ctx->blob, ctx->scene->primitives)[primitive].object &

@@ -1,5 +1,5 @@
 /*
- * metal.h: what metals reflect, however the scene describes them: by an index, by colours, under a film.
+ * metal.h: the reflectance of metals, described by an index, by colours, or under a film.
  */
 #ifndef CRT_METAL_H
 #define CRT_METAL_H

@@ -11,7 +11,7 @@
 CRT_KERNEL_BEGIN
 
 /* Narrower than this GGX is taken for a mirror: its value and density would lose their digits in single
-   precision, and the image cannot tell. */
+   precision, and the difference would not be visible. */
 #define CRT_ALPHA_MIN 1e-3f
 
 /* Two directions in the shading frame, each with the root of Smith's shadowing, a = √(cos² + α² sin²),
@@ -60,7 +60,7 @@ CRT_FN CrtMicrofacet crt_microfacet(const CrtBsdf *b, vec3 wi) {
     return m;
 }
 
-/* What a metal gives back of what its microfacets lose, f·cos. */
+/* The share of its microfacets' losses that a metal gives back, f·cos. */
 CRT_FN vec4 crt_metal_returned(const CrtBsdf *b, vec3 wi, f32 cos_i) {
     return b->reflectance *
            (crt_loss_lane(b, 0u, crt_loss_place(b, wi, cos_i), 0.0f) * crt_lambert(cos_i));
@@ -109,16 +109,16 @@ CRT_FN CrtScatter crt_sample_rough_conductor(const CrtBsdf *b, CrtRandom2 u) {
     return s;
 }
 
-/* Rough dielectric (Walter et al. 2007; PBRT 4e, 9.7): as much of the light as Fresnel says is mirrored in
- * each microfacet, the rest is refracted by it.
+/* Rough dielectric (Walter et al. 2007; PBRT 4e, 9.7): each microfacet mirrors the share of light that
+ * Fresnel's equations give, and refracts the rest.
  *
  * Where the index depends on the wavelength, so does the microfacet that refracts between two directions.
  * Every wavelength has its value for any pair of directions; a direction is sampled by the index of one of
- * them, chosen at each vertex anew by what the path carries in each (`lanes`), and its density is the mean
- * over that choice. All four wavelengths live on, weighted: the balance heuristic over the wavelengths at
+ * them, chosen at each vertex by the path's throughput in each (`lanes`), and its density is the mean over
+ * that choice. All four wavelengths stay alive, weighted: the balance heuristic over the wavelengths at
  * each vertex (compare Wilkie et al. 2014, who choose one for a whole path). */
 
-/* What one microfacet refracts from w_i to w_o at one wavelength. */
+/* Refraction by one microfacet from w_i to w_o at one wavelength. */
 typedef struct CrtRefracted {
     f32 value; /* f·|cos| */
     f32 pdf;
@@ -128,7 +128,7 @@ typedef struct CrtRefracted {
    surface, the half vector loses its digits: it is taken for smooth. Radians. */
 #define CRT_BEND_MIN 1e-4f
 
-/* Whether an interface of index `eta` and width `alpha` is more than smooth at all four wavelengths. */
+/* True if an interface of index `eta` and width `alpha` is more than smooth at all four wavelengths. */
 CRT_FN int crt_is_rough(f32 alpha, vec4 eta) {
     const vec4 bend = make_vec4(crt_abs(V4X(eta) - 1.0f), crt_abs(V4Y(eta) - 1.0f),
                                 crt_abs(V4Z(eta) - 1.0f), crt_abs(V4W(eta) - 1.0f));

@@ -1,14 +1,14 @@
 /*
  * normal_map.h: normals from an image, in the tangent space of the texture's coordinates.
  *
- * A mapped normal that is merely put in place of the surface's own loses light: what the BSDF about it sends
- * below the surface, and all that it would send towards a viewer behind it. Here it is, as in Schüßler et
- * al. (2017, "Microfacet-based Normal Mapping for Robust Monte Carlo Path Tracing"), the normal of a facet
- * beside which stands a wall, a mirror upright on the surface: a viewer behind it sees it in the wall. What
- * leaves the facet downwards is mirrored up by the surface: by its interpolated normal, where it has one,
- * and then by its geometric one, as is what other smooth surfaces send down (shading_normal.h). So of light
- * from everywhere a surface sends on what its BSDF does. Why there is no shadowing by the walls:
- * docs/decisions/0024-normal-maps.md.
+ * A mapped normal that is merely put in place of the surface's own loses light: what the BSDF about it
+ * sends below the surface, and all that it would send towards a viewer behind it. Here it is, as in
+ * Schüßler et al. (2017, "Microfacet-based Normal Mapping for Robust Monte Carlo Path Tracing"), the
+ * normal of a facet beside which stands a wall, a mirror upright on the surface: a viewer behind it sees it
+ * in the wall. The surface mirrors up light that leaves the facet downwards: by its interpolated normal,
+ * where it has one, and then by its geometric one, as other smooth surfaces do (shading_normal.h). So in
+ * uniform light a surface reflects as much as its BSDF. docs/decisions/0024-normal-maps.md says why the
+ * walls cast no shadow.
  *
  * Surfaces that transmit have no walls: there the mapped normal stands in the place of the other, and what
  * would leave to the wrong side is mirrored by the face (crt_to_its_side).
@@ -62,7 +62,8 @@ CRT_FN vec3 crt_mapped_normal(const CrtContext *ctx, const CrtSurface *surface, 
     return size > 0.0f ? mapped * (1.0f / size) : n;
 }
 
-/* Makes of a surface with a normal map the facet, and of wo the direction that it is seen from. */
+/* Turns a surface with a normal map into the facet, and wo into the direction from which the facet is
+   seen. */
 CRT_FN void crt_map_normal(const CrtContext *ctx, CrtSurface *surface, u32 slot, vec3 *wo, CrtBsdf *b) {
     b->facet = 0;
     if (ctx->scene->compositions.count == 0u) return;
@@ -82,7 +83,8 @@ CRT_FN void crt_map_normal(const CrtContext *ctx, CrtSurface *surface, u32 slot,
         *wo = crt_mirrored(*wo, normalize3(b->base * slope_cos - mapped * front));
 }
 
-/* The normal that tells reflection from transmission, and the one that light arrives about by its cosine. */
+/* The normal that separates reflection from transmission, and the one that light arrives about by its
+   cosine. */
 CRT_FN vec3 crt_side(const CrtBsdf *b) { return crt_is_facet(b) ? b->side : b->ng; }
 CRT_FN vec3 crt_base(const CrtBsdf *b) { return crt_is_facet(b) ? b->base : b->ns; }
 
@@ -94,13 +96,14 @@ CRT_FN f32 crt_scatter_cosine(const CrtBsdf *b, vec3 wi) {
     return above > 0.0f ? -above : cosine;
 }
 
-/* Whether the base of a facet is off its side: an interpolated normal. */
+/* True if the base of a facet differs from its side: the surface has an interpolated normal. */
 CRT_FN int crt_is_tilted(const CrtBsdf *b) {
     const vec3 off = b->base - b->side;
     return dot3(off, off) > 0.0f;
 }
 
-/* How many directions of a facet end in wi: that itself, and the one that the surface mirrors into it. */
+/* The number of a facet's directions that end in wi: wi itself, and the one that the surface mirrors into
+   it. */
 CRT_FN u32 crt_ways(const CrtBsdf *b, vec3 wi) {
     if (!b->facet) return 1u;
     return dot3(wi, b->base) > 0.0f ? 2u : 0u;

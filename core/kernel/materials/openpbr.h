@@ -1,7 +1,8 @@
 /*
- * openpbr.h: metals as OpenPBR Surface 1.1 says them: by their colours straight on and near the edge, not by
- * an index. "F82-tint" (Kutz, Hasan and Edmondson 2021): Schlick's curve from F₀ to 1, less a dip that is
- * deepest at the cosine 1/7 (82°), where `tint` of Schlick's value is left; all of it times a weight:
+ * openpbr.h: metals as OpenPBR Surface 1.1 describes them: by their colours straight on and near the edge,
+ * not by an index. "F82-tint" (Kutz, Hasan and Edmondson 2021): Schlick's curve from F₀ to 1, less a dip
+ * that is deepest at the cosine 1/7 (82°), where `tint` of Schlick's value is left; all of it times a
+ * weight:
  *
  *     F = w (F₀ + (1 − F₀)(1 − μ)⁵ − b μ (1 − μ)⁶)
  *     b = (1 − tint) F_Schlick(1/7) / ((1/7)(6/7)⁶)
@@ -20,7 +21,7 @@ CRT_FN int crt_is_colored(const CrtBsdf *b) {
     return CRT_HAS(ROUGH_CONDUCTOR) && (b->flags & CRT_BSDF_COLORED) != 0u;
 }
 
-/* From b->eta, F₀, and b->k, the tint, what is asked for at each angle. */
+/* Replaces b->eta, F₀, and b->k, the tint, by w F₀ and b, so that each angle costs less. */
 CRT_FN void crt_prepare_colors(CrtBsdf *b, f32 weight) {
     b->flags |= CRT_BSDF_COLORED;
     b->edge = weight;
@@ -29,7 +30,7 @@ CRT_FN void crt_prepare_colors(CrtBsdf *b, f32 weight) {
     b->k = (splat4(1.0f) - b->k) * near_edge * CRT_EDGE_DIP;
 }
 
-/* Dark metals with a dark tint would have less than nothing beside the dip. */
+/* Dark metals with a dark tint would have a reflectance below 0 beside the dip. */
 CRT_FN vec4 crt_colored_reflectance(const CrtBsdf *b, f32 cos_i) {
     const f32 away = crt_max(1.0f - cos_i, 0.0f), away2 = away * away, away5 = away2 * away2 * away;
     return crt_max4(b->eta + (splat4(b->edge) - b->eta) * away5 - b->k * (cos_i * away5 * away),

@@ -35,7 +35,7 @@ CRT_FN f32 crt_pane_transmittance_lane(f32 cos_i, f32 eta, int filmed, f32 film_
                    crt_pane_polarised(eta * eta * cos_i, b, filmed, along));
 }
 
-/* What passes a pane at the path's wavelengths. Both directions of the light see the same. */
+/* The transmittance of a pane at the path's wavelengths. It is the same in both directions of the light. */
 CRT_FN vec4 crt_pane_transmittance(const CrtBsdf *b, f32 cos_i) {
     const int filmed = crt_has_film(b);
     vec4 passed = splat4(0.0f);

@@ -1,7 +1,7 @@
 /*
- * plastic.h: a diffuse base under a clear coat, smooth or rough. What the coat reflects is E(θ); the rest
- * enters, is scattered by the base as Lambert's law says, and leaves, but for what the coat sends back from
- * below, to be scattered again:
+ * plastic.h: a diffuse base under a clear coat, smooth or rough. The coat reflects the share E(θ). The
+ * rest enters, and the base scatters it by Lambert's law. It leaves, except for the share that the coat
+ * sends back from below, which the base scatters again:
  *
  *     f = f_coat + a/π (1 − E(θ_o)) (1 − E(θ_i)) / (η² (1 − a k)),    k = 1 − (1 − Ē)/η²
  *
@@ -61,8 +61,8 @@ CRT_FN vec4 crt_plastic(const CrtBsdf *b, vec3 wi, f32 *pdf) {
                          (2.0f * (m.root_o * m.cos_i + m.root_i * m.cos_o)));
 }
 
-/* `choice`: of coat and base. What a smooth coat mirrors has the density 0 of a delta; the rest, that of the
-   base alone, which light sampling competes with. */
+/* `choice`: of coat and base. Light that a smooth coat mirrors has the density 0 of a delta; the rest has
+   that of the base alone, which light sampling competes with. */
 CRT_FN CrtScatter crt_sample_plastic(const CrtBsdf *b, CrtRandom2 u, f32 choice) {
     CrtScatter s = crt_no_scatter();
     if (choice < b->coat_chance) {

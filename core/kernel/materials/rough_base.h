@@ -6,7 +6,7 @@
  *
  * for the roughness r, with t the larger cosine where s > 0, else 1. It is scaled so that it loses nothing
  * where it loses least; what it loses elsewhere is given back, diffusely. Under a coat that lets in T(θ)
- * the same is asked of what comes through the coat. With
+ * the same holds for the light that comes through the coat. With
  *
  *     A(θ_o) = ∫ T(θ_i) g cos θ_i dω_i,    N = max A,    L = 1 − A/N
  *     L̄ = ∫ L T cos dω / (π T̄),            ρ_m = ρ² (1 − L̄) / (1 − ρ L̄)
@@ -16,7 +16,7 @@
  *     f = T(θ_o) T(θ_i) (ρ g / N + ρ_m L(θ_o) L(θ_i) / (π T̄ L̄))
  *
  * which is EON where T is 1. It is reciprocal, and a white base sends back all that the coat lets in: L is
- * a table by the cosine, the compiler of the scene's (compile/rough_base.h).
+ * a table by the cosine, which the compiler of the scene makes (compile/rough_base.h).
  */
 #ifndef CRT_ROUGH_BASE_H
 #define CRT_ROUGH_BASE_H

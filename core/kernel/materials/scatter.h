@@ -1,6 +1,6 @@
 /*
- * scatter.h: what a BSDF is made of (CrtBsdf) and what it answers (CrtScatter); Fresnel's equations; and the
- * surfaces without microfacets: Lambert's, mirrors, smooth dielectrics, panes.
+ * scatter.h: the state of a BSDF (CrtBsdf) and a scattered direction (CrtScatter); Fresnel's equations; and
+ * the surfaces without microfacets: Lambert's, mirrors, smooth dielectrics, panes.
  *
  * w_o and w_i point away from the surface. Radiance is transported: crossing into an index η times the
  * other scales it by 1/η².
@@ -17,7 +17,7 @@ CRT_KERNEL_BEGIN
 #define CRT_BSDF_TRANSMITS 4u  /* to the other side */
 #define CRT_BSDF_DISPERSIVE 8u /* directions depend on the wavelength */
 #define CRT_BSDF_CHOOSES 16u   /* crt_bsdf_sample needs its second pair of random numbers */
-#define CRT_BSDF_BOUNDS 32u    /* the surface of a body: what lies behind it is another medium */
+#define CRT_BSDF_BOUNDS 32u    /* the surface of a body: a different medium lies behind it */
 #define CRT_BSDF_FILM 64u      /* under a thin film: reflectances are thin_film.h's */
 #define CRT_BSDF_COLORED 256u  /* a metal of OpenPBR's: reflectances are openpbr.h's */
 #define CRT_BSDF_ANISOTROPIC 128u /* wider along its tangent than across it */
@@ -25,7 +25,7 @@ CRT_KERNEL_BEGIN
 /* A BSDF without CRT_BSDF_DELTA may still have single directions beside its lobe: crt_bsdf_sample gives
    those the pdf 0, and crt_bsdf is of the lobe alone. */
 
-/* Where the losses of a rough material are looked up (compensation.h). */
+/* The rows in the tables of losses of a rough material (compensation.h). */
 typedef struct CrtLosses {
     CRT_GLOBAL const f32 *rows; /* of the outside, at the roughness at or below, at the first index */
     u32 side;                   /* of w_o: 0 outside, 1 inside */
@@ -35,7 +35,7 @@ typedef struct CrtLosses {
     vec4 index;                 /* rows from the first index to those of the path's wavelengths */
 } CrtLosses;
 
-/* A material at one vertex. What its kind does not have is not set. */
+/* A material at one vertex. Members that its kind does not use are not set. */
 typedef struct CrtBsdf {
     u32 type;         /* CRT_MATERIAL_… */
     u32 flags;        /* CRT_BSDF_…; 0: everything is absorbed */
@@ -167,8 +167,8 @@ CRT_FN CrtScatter crt_sample_mirror(vec4 reflectance, vec3 wo, vec3 ns, vec3 ng)
     return s;
 }
 
-/* At an interface as much is mirrored as `fresnel` says of each wavelength, with the chance `reflect`; the
-   rest is refracted by `eta`. `alone`: that is right for the hero only. Sides are those of ns. */
+/* An interface mirrors the share `fresnel` of each wavelength, with the chance `reflect`, and refracts the
+   rest by `eta`. `alone`: the refraction is right for the hero only. Sides are those of ns. */
 CRT_FN CrtScatter crt_reflect_or_refract(vec3 wo, vec3 ns, f32 cos_i, f32 eta, vec4 fresnel, vec4 passed,
                                          f32 reflect, int alone, f32 u) {
     CrtScatter s;

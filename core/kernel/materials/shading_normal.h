@@ -31,8 +31,8 @@ CRT_FN int crt_is_facet(const CrtBsdf *b) { return CRT_HAS(NORMAL_MAP) && b->fac
     (CRT_FEATURES_LOBE & ~(1ul << CRT_BIT_DIFFUSE | 1ul << CRT_BIT_ROUGH_DIELECTRIC))
 #define CRT_HAS_GLOSSY ((CRT_KERNEL_MATERIALS & CRT_FEATURES_GLOSSY) != 0ul)
 
-/* Makes w_o and the shading normal see each other, of what is not Lambertian. What only mirrors is seen as
-   the face itself then: the direction is the same. */
+/* Puts w_o and the shading normal on one side, of materials that are not Lambertian. Glossy reflection
+   mirrors w_o; all others take the normal of the face, and w_o stays the same. */
 CRT_FN void crt_face_viewer(CrtBsdf *b, int transmits) {
     if (dot3(b->wo, b->ns) > 0.0f) return;
     if (CRT_HAS_GLOSSY && !transmits && ((CRT_FEATURES_GLOSSY >> b->type) & 1ul) != 0ul)
@@ -103,7 +103,7 @@ CRT_FN CrtScatter crt_sample_lambert(const CrtBsdf *b, CrtRandom2 u) {
     return s;
 }
 
-/* What goes below the surface, mirrored up by it. */
+/* Mirrors a direction up that goes below the surface. */
 CRT_FN CrtScatter crt_mirror_up(const CrtBsdf *b, CrtScatter s) {
     if (!CRT_HAS(SMOOTH_NORMALS) || !s.valid) return s;
     if (dot3(s.wi, b->ng) < 0.0f) {
@@ -114,7 +114,7 @@ CRT_FN CrtScatter crt_mirror_up(const CrtBsdf *b, CrtScatter s) {
     return s;
 }
 
-/* Whether w leaves to the same side of the face as of n_s. */
+/* True if w leaves to the same side of the face as of n_s. */
 CRT_FN int crt_keeps_side(const CrtBsdf *b, vec3 w) {
     const f32 side = dot3(w, b->ng);
     return dot3(w, b->ns) > 0.0f ? side > 0.0f : side < 0.0f;

@@ -1,12 +1,12 @@
 /*
- * thin_film.h: a film of some hundred nanometres on a metal or a dielectric: what its two sides reflect
- * interferes. Airy's sum of all rounds within the film (Born and Wolf, 7.6.1), for both polarisations, at
- * each wavelength of the path:
+ * thin_film.h: a film of some hundred nanometres on a metal or a dielectric: the reflections of its two
+ * sides interfere. Airy's sum of all rounds within the film (Born and Wolf, 7.6.1), for both polarisations,
+ * at each wavelength of the path:
  *
  *     r = (r₁₂ + r₂₃ e) / (1 + r₁₂ r₂₃ e),    e = exp(2πi · 2 n₂ d cos θ₂ / λ)
  *
- * The film absorbs nothing: what a dielectric under it does not reflect passes. Beyond the film's critical
- * angle cos θ₂ is imaginary, e real, and light tunnels.
+ * The film absorbs nothing: light that a dielectric under it does not reflect passes. Beyond the film's
+ * critical angle cos θ₂ is imaginary, e real, and light tunnels.
  */
 #ifndef CRT_THIN_FILM_H
 #define CRT_THIN_FILM_H
@@ -139,7 +139,7 @@ CRT_FN vec4 crt_dielectric_reflectance(const CrtBsdf *b, f32 cos_i) {
     return crt_fresnel_dielectric4(cos_i, b->eta);
 }
 
-/* Whether what a dielectric reflects depends on the wavelength. */
+/* True if the reflectance of a dielectric depends on the wavelength. */
 CRT_FN int crt_is_divided(const CrtBsdf *b) {
     return (CRT_HAS(DISPERSION) && (b->flags & CRT_BSDF_DISPERSIVE) != 0u) || crt_has_film(b);
 }

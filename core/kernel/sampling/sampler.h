@@ -28,7 +28,7 @@ CRT_KERNEL_BEGIN
 /* Those of the surfaces that a ray meets before it ends, in their order, follow CRT_DIM_PASS +
    CRT_PASSES_MAX · (2 · vertex), and of the vertex's shadow ray CRT_PASSES_MAX later. */
 #define CRT_DIM_PASS 0x80000000u
-#define CRT_PASSES_MAX 4096u /* what a ray meets after so many stops it */
+#define CRT_PASSES_MAX 4096u /* the next surface stops a ray */
 /* On from there, where there are panes: whether one is passed, and which material of a mix is met. */
 #define CRT_DIM_PANE 0x20000000u
 #define CRT_DIM_PANE_MIX 0x40000000u
@@ -151,7 +151,7 @@ CRT_FN CrtSampler crt_sampler_begin(u32 kind, u32 replicate_shift, CrtSeed seed,
     if (CRT_HAS(SOBOL) && kind == CRT_SAMPLER_SOBOL) {
         const u32 shift = CRT_HAS(REPLICATES) ? replicate_shift : 0u;
         const u64 index = crt_index_in_replicate(sample, shift);
-        /* A sequence has 2^32 points; what lies beyond them begins another. */
+        /* A sequence has 2^32 points; samples beyond them begin another. */
         const u32 sequence = ((u32)(index >> 32) << shift) + crt_replicate(sample, shift);
         s.pixel_key = crt_pixel_key(seed, pixel, sequence);
         s.index = crt_reverse_bits((u32)index);

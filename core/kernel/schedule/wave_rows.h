@@ -36,7 +36,7 @@ enum CrtWaveRow {
     CRT_ROW_PASSED
 };
 
-/* How many rows the slots of a scene have. */
+/* The number of rows of a scene's slots. */
 CRT_FN u32 crt_wave_rows(u64 features) {
     if (CRT_IN_MASK(features, THIN_DIELECTRIC)) return CRT_ROW_PASSED + 1u;
     if (CRT_IN_MASK(features, AOV)) return CRT_ROW_PRIMITIVE + 1u;
@@ -50,7 +50,7 @@ typedef struct CrtWave {
     u32 x0, y0, x1, y1;
     u64 first_sample;
     u32 sample_count;
-    u32 slices;           /* each adds to a film of its own */
+    u32 slices;           /* each adds to a separate film */
     u32 blocks_per_slice;
     u32 slots;            /* slices · blocks_per_slice · CRT_WAVE_BLOCK */
     CRT_GLOBAL vec4 *rows;
@@ -68,11 +68,11 @@ typedef struct CrtWave {
 } CrtWave;
 CRT_ASSERT_SIZE(CrtWave, 264);
 
-/* Words of 4 bytes that so many slots and queues take beside the rows. */
+/* Words of 4 bytes that slots and queues take besides the rows. */
 #define CRT_WAVE_WORDS(slots, queues) ((slots) * (3u + (queues)) + 2u * CRT_WAVE_QUEUES + 1u)
 
-/* How many slots the wave's pixels and slices make, and where all that is kept of them begins. The host
-   calls. */
+/* Sets the number of slots for the wave's pixels and slices, and where each of their arrays begins. The
+   host calls this. */
 CRT_FN void crt_wave_lay_out(CrtWave *wave, u32 queues, CRT_GLOBAL vec4 *rows, CRT_GLOBAL u32 *words) {
     const u32 across = (wave->x1 - wave->x0 + CRT_WAVE_BLOCK_WIDTH - 1u) / CRT_WAVE_BLOCK_WIDTH;
     const u32 down = (wave->y1 - wave->y0 + CRT_WAVE_BLOCK_HEIGHT - 1u) / CRT_WAVE_BLOCK_HEIGHT;
@@ -87,7 +87,7 @@ CRT_FN void crt_wave_lay_out(CrtWave *wave, u32 queues, CRT_GLOBAL vec4 *rows, C
     wave->finished = wave->lengths + 2u * CRT_WAVE_QUEUES;
 }
 
-/* Which samples of which pixel a slot takes. */
+/* The pixel and the samples of a slot. */
 typedef struct CrtWaveShare {
     u32 x, y, slice;
     u32 first, count; /* samples, from the launch's first */
@@ -114,7 +114,7 @@ CRT_FN CRT_GLOBAL vec4 *crt_row(const CrtWave *wave, u32 row, u32 slot) {
 CRT_FN vec4 crt_row_of(vec3 v, f32 w) { return make_vec4(V3X(v), V3Y(v), V3Z(v), w); }
 CRT_FN vec3 crt_row_vector(vec4 row) { return make_vec3(V4X(row), V4Y(row), V4Z(row)); }
 
-/* Whether the rows of the first hit are there. */
+/* True if the wave has the rows of the first hit. */
 CRT_FN int crt_wave_has_first_hit(const CrtContext *ctx) {
     return CRT_HAS(AOV) && CRT_IN_MASK(ctx->scene->features, AOV);
 }
@@ -239,7 +239,8 @@ CRT_FN CrtRay crt_load_shadow_ray(const CrtWave *wave, u32 slot) {
     return ray;
 }
 
-/* That of the vertex that asked a shadow ray: crt_shade has counted it where the path goes on. */
+/* The depth of the vertex that sent a shadow ray: crt_shade has counted that vertex already where the path
+   goes on. */
 CRT_FN u32 crt_asking_depth(const CrtWave *wave, u32 slot, u32 state) {
     return crt_load_depth(wave, slot) - (state & CRT_WAVE_ENDED ? 0u : 1u);
 }

@@ -1,10 +1,10 @@
 /*
- * wavefront.h: paths advanced by kernels of their own for tracing and for shading (Laine, Karras and Aila
- * 2013, "Megakernels Considered Harmful"). A slot takes a share of one pixel's samples, one after another.
- * A pass traces what every slot waits for and sorts the slots by the kind of material that they have met;
- * then each kind is shaded by a kernel that holds that kind alone. Between kernels a path lies in rows of 16
- * bytes, a row of all slots after another. What a slot computes, and in which order it adds to the film, is
- * what crt_render_pixel does.
+ * wavefront.h: paths advanced by separate kernels for tracing and for shading (Laine, Karras and Aila 2013,
+ * "Megakernels Considered Harmful"). A slot takes a share of one pixel's samples, one after another. A pass
+ * traces the ray that each slot waits for and sorts the slots by the kind of material that they have met;
+ * then each kind is shaded by a kernel that holds that kind alone. Between kernels a path lies in rows of
+ * 16 bytes, a row of all slots after another. A slot computes what crt_render_pixel computes, and adds it
+ * to the film in the same order.
  */
 #ifndef CRT_WAVEFRONT_H
 #define CRT_WAVEFRONT_H
@@ -53,8 +53,8 @@ CRT_FN int crt_wave_next_sample(const CrtContext *ctx, const CrtWave *wave, u32 
     return 1;
 }
 
-/* What a ray meets where it may pass surfaces, and *ray from behind the last that it has passed. For scenes
-   without panes: there crt_wave_choose works out what passes, so that tracing stays short. */
+/* The hit of a ray that may pass surfaces; *ray then begins behind the last surface that it has passed. For
+   scenes without panes: in scenes with panes crt_wave_choose lets rays pass, so that tracing stays short. */
 CRT_FN CrtHit crt_trace_passing(const CrtContext *ctx, CrtSampler *sampler, CrtPassage *way, CrtRay *ray) {
     for (;;) {
         CrtHit hit = crt_no_hit(ray->reach);
@@ -64,7 +64,7 @@ CRT_FN CrtHit crt_trace_passing(const CrtContext *ctx, CrtSampler *sampler, CrtP
 }
 
 /* Traces the shadow ray that a slot waits for, and adds its light where nothing stops it. Returns 0 where
-   crt_wave_choose has to say whether it passes what it meets. */
+   crt_wave_choose has to decide if the ray passes the surface that it meets. */
 CRT_FN int crt_wave_resolve_shadow(const CrtContext *ctx, const CrtWave *wave, u32 slot, u32 state,
                                    CrtRayCount *rays) {
     CrtRay ray = crt_load_shadow_ray(wave, slot);
@@ -156,8 +156,8 @@ CRT_FN u32 crt_wave_trace(const CrtContext *ctx, const CrtWave *wave, u32 slot, 
     return queue;
 }
 
-/* Whether the slot's ray passes what it has met. If so, it is traced on from behind it in the next pass. A
-   shadow ray that is stopped, or has passed the last surface, has its answer. */
+/* True if the slot's ray passes the surface that it has met. The next pass then traces it on from behind
+   that surface. A shadow ray is finished if it is stopped or has passed the last surface. */
 CRT_FN int crt_wave_passes(const CrtContext *ctx, const CrtWave *wave, u32 slot) {
     const u32 state = wave->state[slot];
     const int shadow = (state & CRT_WAVE_ASKED) != 0u;
@@ -223,7 +223,7 @@ CRT_FN void crt_wave_shade(const CrtContext *ctx, const CrtWave *wave, u32 slot)
         *crt_row(wave, CRT_ROW_SHADOW_DIRECTION, slot) =
             crt_row_of(shadow.ray.d, crt_from_bits(CRT_HAS(MEDIA) ? shadow.media : 0u));
         *crt_row(wave, CRT_ROW_SHADOW_RADIANCE, slot) = shadow.radiance;
-        /* What its ray takes of a state's numbers follows what the vertex took. */
+        /* The shadow ray takes the generator's numbers that follow those of the vertex. */
         if ((CRT_HAS(OPACITY) || CRT_HAS(MIX)) && !alive) crt_store_xorshift(ctx, wave, slot, &path.sampler);
     }
     wave->state[slot] = state;

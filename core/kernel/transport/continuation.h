@@ -37,8 +37,8 @@ CRT_FN int crt_continue(const CrtContext *ctx, CrtPath *path, const CrtSurface *
     return 1;
 }
 
-/* Russian roulette on the spectral maximum. Returns 0 where the path ends; one that carries nothing ends in
-   any case. */
+/* Russian roulette on the spectral maximum. Returns 0 where the path ends; a path that carries no light
+   always ends. */
 CRT_FN int crt_roulette(const CrtContext *ctx, CrtPath *path, u32 dimension) {
     const f32 carried = max4(path->throughput) * path->eta_square;
     if (!(carried > 0.0f)) return 0;

@@ -29,9 +29,9 @@ CRT_FN void crt_add_emission(const CrtContext *ctx, CrtPath *path, const CrtSurf
         if (crt_has_light_tree(ctx))
             light.pdf = light.pdf * crt_light_tree_probability(ctx, surface->light, path->p, path->side);
         if (light.pdf > 0.0f) {
-            /* The ray starts a clearance off p, from which lights are sampled. Close to a light that is
-               another direction: both techniques estimate what arrives at p, and are weighed by the area of
-               the light per probability. */
+            /* The ray starts a clearance off p, from which lights are sampled. Close to a light the
+               directions from the two differ: both techniques estimate what arrives at p, and are weighed
+               by the area of the light per probability. */
             const f32 nearer = t / distance;
             const f32 area = light.cosine / crt_abs(dot3(surface->ng, path->ray.d)) * nearer * nearer;
             const f32 ratio = light.pdf / path->scatter_pdf * area;

@@ -18,7 +18,7 @@
 
 CRT_KERNEL_BEGIN
 
-/* Whether the scene has surfaces that rays may pass. */
+/* True if the scene has surfaces that rays may pass. */
 CRT_FN int crt_is_passable(const CrtContext *ctx) {
     return (CRT_HAS(OPACITY) && ctx->scene->compositions.count != 0u) || crt_has_panes(ctx);
 }
@@ -62,7 +62,7 @@ CRT_CALLED_FN CrtRay crt_ray_behind(CrtRay ray, vec3 p, f32 clearance, vec3 ng) 
     return behind;
 }
 
-/* Whether a ray passes the pane that it meets. Updates what the ray carries. */
+/* True if a ray passes the pane that it meets. Updates the light that the ray carries. */
 CRT_FN int crt_passes_pane(const CrtContext *ctx, const CrtSurface *surface, u32 material,
                            CrtSampler *sampler, u32 dimension, CrtPassage *way) {
     CRT_GLOBAL const CrtMaterial *row = CRT_ARRAY(CrtMaterial, ctx->blob, ctx->scene->materials) + material;
@@ -87,7 +87,7 @@ CRT_FN int crt_passes_pane(const CrtContext *ctx, const CrtSurface *surface, u32
     return 0;
 }
 
-/* Whether a ray passes a surface with opacity below 1. A hole in the surface of a body is a hole in the
+/* True if a ray passes a surface with opacity below 1. A hole in the surface of a body is a hole in the
    body: a ray that entered through a hole is in no glass and leaves anywhere; a ray in the glass meets no
    hole. */
 CRT_FN int crt_passes_hole(const CrtContext *ctx, const CrtSurface *surface, CrtValue opacity, u32 medium,
@@ -97,7 +97,7 @@ CRT_FN int crt_passes_hole(const CrtContext *ctx, const CrtSurface *surface, Crt
              V4X(crt_value(ctx, opacity, surface, splat4(0.0f))));
 }
 
-/* Whether a ray passes the surface that it meets. If so, it becomes the ray from behind it. */
+/* True if a ray passes the surface that it meets. The ray then begins behind that surface. */
 CRT_FN int crt_passes(const CrtContext *ctx, CrtHit hit, CrtSampler *sampler, CrtPassage *way, CrtRay *ray) {
     if (way->passed >= CRT_PASSES_MAX) return 0;
     const u32 primitive = crt_primitive_of(ctx, hit);

@@ -1,6 +1,6 @@
 /*
- * path_state.h: what a path carries from vertex to vertex, and how that is packed into rows of 16 bytes
- * where a schedule keeps it in memory.
+ * path_state.h: the state of a path between vertices, and its packing into rows of 16 bytes for schedules
+ * that keep it in memory.
  *
  * CRT_PATH_STATE(VERTEX, TREE, BEGIN, FIRST) calls, for each row, one of these with (ROW, declarations,
  * lanes). It states when the row changes:
@@ -12,8 +12,8 @@
  *
  * `declarations` are the members of CrtPath that the row holds, or begins to hold. `lanes` says which
  * members lie in the four lanes of the row: V4 is one vec4; V3 a vec3 and another lane; F4 four lanes; F1
- * one lane. A lane is an F32 or U32 member, WORD (crt_path_word), NUMBERS (what the sampler must remember)
- * or UNUSED.
+ * one lane. A lane is an F32 or U32 member, WORD (crt_path_word), NUMBERS (the state of the sampler) or
+ * UNUSED.
  */
 #ifndef CRT_PATH_STATE_H
 #define CRT_PATH_STATE_H

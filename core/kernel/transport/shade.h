@@ -1,7 +1,7 @@
 /*
  * shade.h: what happens to a path at a vertex: emission that it meets (emission.h), a shadow ray of light
  * sampling (direct_light.h), and the direction in which it goes on (continuation.h). Nothing here traces a
- * ray, so that a backend may trace as it likes.
+ * ray, so that each backend chooses how it traces.
  */
 #ifndef CRT_SHADE_H
 #define CRT_SHADE_H

@@ -73,7 +73,7 @@ CRT_FN vec4 crt_texel(const CrtContext *ctx, const CrtTexture *texture, i32 x, i
 
 CRT_FN vec4 crt_mix4(vec4 a, vec4 b, f32 f) { return a + (b - a) * f; }
 
-/* Where a texture is asked for. */
+/* The coordinates of a texture look-up. */
 typedef struct CrtTexturePlace {
     f32 s, t;
 } CrtTexturePlace;
@@ -101,7 +101,8 @@ CRT_FN vec4 crt_image(const CrtContext *ctx, const CrtTexture *texture, const Cr
     return crt_mix4(upper, lower, y.f);
 }
 
-/* The value of the square: those whose numbers add up to something even, counted from that at (0, 0). */
+/* The value of the square: `even` where its two numbers, counted from the square at (0, 0), have an even
+   sum. */
 CRT_FN CrtValue crt_checker(const CrtTexture *texture, const CrtFacePlace *at) {
     const CrtTexturePlace place = crt_texture_place(texture, at);
     const f32 half_sum = 0.5f * (crt_floor(place.s) + crt_floor(place.t));

@@ -1,6 +1,6 @@
 /*
- * value.h: the one reader of what materials and lights are made of. Tables and textures are not compiled for
- * a scene that has none.
+ * value.h: the one reader of the values of materials and lights. Tables and textures are not compiled for a
+ * scene that has none.
  */
 #ifndef CRT_VALUE_H
 #define CRT_VALUE_H
@@ -9,8 +9,8 @@
 
 CRT_KERNEL_BEGIN
 
-/* A value at the path's wavelengths; all four are the same for a number. `surface`: where it is asked for; 0
-   where there is none, as for the environment: only what depends on no place is asked for there. */
+/* A value at the path's wavelengths; all four are the same for a number. `surface`: the place of the value;
+   0 where there is none, as for the environment, whose values do not depend on a place. */
 CRT_FN vec4 crt_value(const CrtContext *ctx, CrtValue value, const CrtSurface *surface, vec4 position) {
     if (CRT_HAS(TEXTURE) && surface != 0) {
         value = crt_resolve_checker(ctx, value, &surface->at);
