@@ -79,12 +79,13 @@ public:
     }
 
 private:
-    SampleCounts counts() const { return measure_.counts(errors_.size()); }
+    SampleCounts counts() const { return measure_.counts(errors_); }
     Statistic mse() const {
         return [this](const Resample& resample) {
-            return meanOver(resample.errors, [&](std::size_t r) {
-                return measure_.mse(*errors_[r], resample.reference_part);
-            });
+            const double unmet = resample.unmet ? measure_.unmet(*errors_.front(), errors_.size()) : 0;
+            return unmet + meanOver(resample.errors, [&](std::size_t r) {
+                       return measure_.mse(*errors_[r], resample.reference_part);
+                   });
         };
     }
     double renderSeconds(const Resample& resample) const {
