@@ -165,12 +165,15 @@ SampleCounts Measure::counts(const RowList& column) const {
 /// over K pixels have the relative variance 2/K. Their mean is independent of their relative scatter (Basu
 /// 1955, Sankhyā 15), so that intervals as wide as this hold in any such selection.
 double Measure::fewPixelsWidening(const RowList& column) const {
-    constexpr double kFewPixels = 6;  // From here on 99 % of normal images have an error that is known.
-    const std::optional<double> pixels = column.front()->effective_pixels;
-    if (column.size() < 3 || !pixels || *pixels >= kFewPixels) return 1;
+    if (!hasFewPixels(column)) return 1;
     const stats::Summary squares = stats::summarize(variancesOf(column));
     const double scatter = squares.variance / (squares.mean * squares.mean);
-    return std::sqrt(std::max(1.0, 2 / *pixels / scatter));
+    return std::sqrt(std::max(1.0, 2 / *column.front()->effective_pixels / scatter));
+}
+
+bool Measure::hasFewPixels(const RowList& column) {
+    constexpr double kFewPixels = 6;  // From here on 99 % of normal images have an error that is known.
+    return column.size() >= 3 && column.front()->effective_pixels.value_or(kFewPixels) < kFewPixels;
 }
 
 std::vector<double> Measure::variancesOf(const RowList& column) const {

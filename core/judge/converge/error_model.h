@@ -59,6 +59,9 @@ public:
     /// Errors are the spread between replicates from now on; the reference judges bias only.
     void measureErrorsBetweenReplicates() { source_ = ErrorSource::BetweenReplicates; }
     bool usable() const { return scale_ > 0; }
+    /// True if so few pixels have most of the variance that their replicates often scatter as fewer values
+    /// than an error needs to be known.
+    static bool hasFewPixels(const RowList& column);
     /// Of the errors of a column.
     SampleCounts counts(const RowList& column) const;
     /// Of biasSquared(), which always has the reference.
