@@ -57,8 +57,7 @@ public:
         point.replicates = static_cast<std::uint32_t>(times_.size());
         point.seconds = timeOf([this](const Resample& r) { return secondsWithStart(r); });
         point.render_seconds = timeOf([this](const Resample& r) { return renderSeconds(r); });
-        point.relative_rmse =
-            rootOf(counts(), mse(), Measure::hasFewPixels(errors_), options_.confidence);
+        point.relative_rmse = rootOf(counts(), mse(), Measure::hasFewPixels(errors_), options_.confidence);
         SampleCounts both = counts();
         both.times = times_.size();
         const Statistic squares = mse();
