@@ -158,6 +158,9 @@ std::vector<Situation> situations() {
         for (const int rarity : {200, 2000, 20000})
             add(fmt::format("fireflies, one path in {}, {} replicates", rarity, r), true,
                 [=](SyntheticRender& w) { w.fireflies = 1.0 / rarity, w.replicates = r; });
+    for (const int rarity : {200, 2000, 20000})
+        add(fmt::format("fireflies, one path in {}, 16 replicates, no bound given", rarity), true,
+            [=](SyntheticRender& w) { w.fireflies = 1.0 / rarity, w.brightest_known = false; });
     for (const double turns_at : {8.0, 64.0, 512.0, 1e300})
         add(turns_at > 1e6 ? "error² as 1/N²"
                            : fmt::format("error² as 1/N², from {} samples on as 1/N", turns_at),

@@ -3,8 +3,10 @@
 /// reference that is exact, or has noisy folds as `crt reference` makes them.
 #pragma once
 
+#include "base/statistics.h"
 #include "film/luminance_error.h"
 #include "judge/converge/measurement.h"
+#include "judge/stats/squared_noise.h"
 
 #include <algorithm>
 #include <array>
@@ -26,6 +28,8 @@ struct SyntheticRender {
     double before_first_sample = 0.4, start_jitter = 0.02;  ///< Mean, and relative standard deviation.
     /// Of the variance 90 % come from paths as rare as this, of lognormal brightness; 0: normal noise alone.
     double fireflies = 0;
+    /// Rows state the brightest of two thousand such paths, as brightestPathOf() looks for it.
+    bool brightest_known = true;
     double jitter = 0.02;   ///< Relative standard deviation of the time between two looks.
     double prediction = 1;  ///< Predicted over actual error.
     std::uint32_t replicates = 16, looks = 11, pixels = 64;
@@ -112,16 +116,26 @@ inline ErrorMetrics syntheticMetrics(double mse) {
     return error;
 }
 
+/// Share of the variance that comes from fireflies; mean square of a lognormal value of mean 1 and σ = 1.
+inline constexpr double kRareShare = 0.9;
+inline const double kMeanSquare = std::exp(1.0);
+
 /// Sum over this number of samples, of mean 0 and this variance a sample: a Poisson number of lognormal
 /// values.
 inline double syntheticFireflies(double probability, double variance, double samples,
                                  std::mt19937_64& engine) {
     if (!(probability > 0)) return 0;
-    const double square = std::exp(1.0);  // Of a lognormal value of mean 1 and σ = 1.
     double sum = 0;
     for (int n = std::poisson_distribution<int>(probability * samples)(engine); n > 0; --n)
         sum += std::lognormal_distribution<double>(-0.5, 1)(engine);
-    return (sum - probability * samples) * std::sqrt(variance / (probability * square));
+    return (sum - probability * samples) * std::sqrt(variance / (probability * kMeanSquare));
+}
+
+/// Luminance of the brightest of two thousand fireflies: the quantile of 1 − 1/2000.
+inline double syntheticBrightest(const SyntheticRender& what) {
+    if (!(what.fireflies > 0) || !what.brightest_known) return 0;
+    const double of_values = std::exp(-0.5 + stats::normalQuantile(1 - 1 / 2000.0));
+    return of_values * std::sqrt(kRareShare * what.variance / (what.fireflies * kMeanSquare));
 }
 
 /// The image mean is 1.
@@ -148,21 +162,25 @@ inline std::vector<Row> syntheticRows(const Key& key, const SyntheticRender& wha
         const double shrink =
             std::pow(std::min(n, what.turns_at),
                      (1 - what.rate) / 2);  // From independent sampling's error to that of `rate`.
-        std::vector<double> mean(pixels), variances(pixels);
+        std::vector<double> mean(pixels), variances;
+        stats::SquaredNoise noise;
         for (std::uint32_t r = 0; r < replicates; ++r)
             for (std::uint32_t p = 0; p < pixels; ++p) {
                 const auto more = static_cast<double>(samples - before);
                 const double variance = what.variance * syntheticShare(what, p),
-                             rare = what.fireflies > 0 ? 0.9 : 0;
+                             rare = what.fireflies > 0 ? kRareShare : 0;
                 sums[r][p] += normal(engine) * std::sqrt((1 - rare) * variance * more) +
                               syntheticFireflies(what.fireflies, rare * variance, more, engine);
                 images[r][p] =
                     1 + what.mean_bias + (p % 2 == 0 ? what.bias : -what.bias) + shrink * sums[r][p] / n;
                 mean[p] += images[r][p] / replicates;
             }
-        for (std::uint32_t r = 0; r < replicates; ++r)
-            for (std::uint32_t p = 0; p < pixels; ++p)
-                variances[p] += (images[r][p] - mean[p]) * (images[r][p] - mean[p]) / (replicates - 1);
+        for (std::uint32_t p = 0; p < pixels; ++p) {
+            std::vector<double> values;
+            for (std::uint32_t r = 0; r < replicates; ++r) values.push_back(images[r][p]);
+            noise.add(values);
+            variances.push_back(stats::summarize(values).variance);
+        }
         for (std::uint32_t r = 0; r < replicates; ++r) {
             seconds[r] += what.seconds_per_sample * static_cast<double>(samples - before) *
                           (1 + what.jitter * normal(engine));
@@ -179,7 +197,9 @@ inline std::vector<Row> syntheticRows(const Key& key, const SyntheticRender& wha
             // (R − 1)/R · mean (I_r − Ī_r)² = R/(R − 1) · mean (I_r − Ī)²
             row.between_replicates_mse = syntheticDistance(images[r], mean) * replicates / (replicates - 1);
             row.effective_pixels = stats::effectivePixels(variances, replicates - 1);
+            row.heavy_tail_values = noise.heavyTailValues();
             row.mean_luminance = syntheticMean(images[r]);
+            row.rare_luminance = syntheticBrightest(what);
             const double deviation = std::sqrt(what.variance * std::pow(n, -what.rate));
             row.image_mean_standard_error.emplace();
             for (std::size_t c = 0; c < 3; ++c) {

@@ -179,6 +179,7 @@ bool sameRow(const Row& a, const Row& b) {
              a.error->delta_e2000_mean == b.error->delta_e2000_mean)) &&
            a.between_replicates_mse == b.between_replicates_mse && a.fold_mse == b.fold_mse &&
            a.effective_pixels == b.effective_pixels && a.mean_luminance == b.mean_luminance &&
+           a.rare_luminance == b.rare_luminance && a.heavy_tail_values == b.heavy_tail_values &&
            same(a.predicted_relative_rmse, b.predicted_relative_rmse) && a.image_mean == b.image_mean &&
            a.image_mean_standard_error == b.image_mean_standard_error &&
            a.invalid_samples == b.invalid_samples && a.cpu_clock_mhz == b.cpu_clock_mhz &&
@@ -196,6 +197,8 @@ std::vector<Row> fewRows() {
     rows[0].error->delta_e2000_mean = 1.5;
     rows[0].fold_mse = {0.1 + 0.2, 3e-300};
     rows[0].effective_pixels = 12.3456789012345678;
+    rows[0].rare_luminance = 0.1 + 0.7;
+    rows[0].heavy_tail_values = 0.1 + 0.6;
     rows[1].error.reset();
     rows[1].predicted_relative_rmse.reset();
     rows[2].seed = 0xffffffffffffffffull;

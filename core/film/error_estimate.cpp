@@ -17,12 +17,6 @@ constexpr double kUnknown = std::numeric_limits<double>::infinity();
 /// more degrees of freedom have met more than their share (decision 0007).
 constexpr double kLeastDegreesOfFreedom = 2;
 
-/// Rule of three: of what has not been met, no more than this is expected, with 95 % (Hanley and
-/// Lippman-Hand 1983, JAMA 249). The upper ends of intervals count so many more pixels that are as noisy as
-/// the noisiest, or paths as bright as the scene's brightest; their lower ends, where such paths are rare,
-/// as many fewer.
-constexpr double kUnmet = 3;
-
 /// Allowance for pixels as bright as the brightest one that no path has met yet: this number of additional
 /// squares like its own.
 constexpr double kUnseen = 0.5;
@@ -311,6 +305,8 @@ std::optional<ErrorEstimate> estimateError(const Film& film, PixelSet which, con
     const auto squared = [&](double probability) {
         return e.degrees_of_freedom / stats::chiSquaredQuantile(probability, e.degrees_of_freedom);
     };
+    // The upper end counts kUnmet more pixels that are as noisy as the noisiest, or paths as bright as the
+    // scene's brightest; the lower end, where such paths are rare, as many fewer.
     e.relative_rmse_95 = {e.relative_rmse * std::sqrt(std::max(0.0, squared(0.975) - chance)),
                           e.relative_rmse * std::sqrt(squared(0.025) + unmet)};
     // The squared error that the image has scatters like the normal part of one degree of freedom a pixel,

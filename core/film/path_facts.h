@@ -15,6 +15,10 @@ struct BrightestPath {
     bool operator==(const BrightestPath&) const = default;
 };
 
+/// Rule of three: of what has not been met, no more than this is expected, with 95 % (Hanley and
+/// Lippman-Hand 1983, JAMA 249).
+inline constexpr double kUnmet = 3;
+
 struct PathFacts {
     bool independent = false;  ///< Samples are not of a Sobol sequence: their spread is no mere bound.
     BrightestPath brightest{};

@@ -11,6 +11,7 @@
 #include "judge/stats/color_difference.h"
 #include "judge/stats/flip.h"
 #include "judge/stats/metrics.h"
+#include "judge/stats/squared_noise.h"
 #include "render/brightest_path.h"
 #include "render/report.h"
 
@@ -113,6 +114,9 @@ Row ConfigurationRun::look(const Film& film, std::uint32_t replicate, bool last)
     const std::size_t pixels = film.counts.size();
     LookPlane luminance = stats::luminances(image.pixels, stats::luminanceWeights(scene_.film.color_space));
     row.mean_luminance = stats::meanLuminance(luminance);
+    if (paths_.brightest.rare)
+        row.rare_luminance =
+            paths_.brightest.luminance * std::exp2(developmentOf(scene_).forFloats().exposure_ev);
     for (std::size_t p = 0; p < pixels; ++p)
         for (std::size_t c = 0; c < 3; ++c)
             row.image_mean[c] += image.pixels[3 * p + c] / static_cast<double>(pixels);
@@ -322,11 +326,16 @@ void fillBetweenReplicates(std::vector<Row>& rows, const Key& key,
         std::vector<double> sum(replicates.begin()->second.size());
         for (const auto& [replicate, plane] : replicates)
             for (std::size_t p = 0; p < sum.size(); ++p) sum[p] += plane[p];
-        std::vector<double> variances(sum.size());
-        for (std::size_t p = 0; p < sum.size(); ++p)
-            for (const auto& [replicate, plane] : replicates)
-                variances[p] += std::pow(plane[p] - sum[p] / count, 2) / (count - 1);
+        std::vector<double> variances, values;
+        stats::SquaredNoise noise;
+        for (std::size_t p = 0; p < sum.size(); ++p) {
+            values.clear();
+            for (const auto& [replicate, plane] : replicates) values.push_back(plane[p]);
+            noise.add(values);
+            variances.push_back(stats::summarize(values).variance);
+        }
         const double effective = stats::effectivePixels(variances, count - 1);
+        const std::optional<double> heavy_tail_values = noise.heavyTailValues();
         for (Row& row : rows) {
             if (!(row.key == key) || row.samples != samples) continue;
             const auto found = replicates.find(row.replicate);
@@ -338,6 +347,7 @@ void fillBetweenReplicates(std::vector<Row>& rows, const Key& key,
             }
             row.between_replicates_mse = (count - 1) / count * squares / static_cast<double>(sum.size());
             row.effective_pixels = effective;
+            row.heavy_tail_values = heavy_tail_values;
         }
     }
 }

@@ -1,6 +1,9 @@
 #include "judge/converge/error_model.h"
 
 #include "film/luminance_error.h"
+#include "film/path_facts.h"
+
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
@@ -139,16 +142,69 @@ SampleCounts Measure::countsOfBias(std::size_t replicates) const {
     return counts;
 }
 
-SampleCounts Measure::counts(std::size_t replicates) const {
-    if (source_ == ErrorSource::Reference) return countsOfBias(replicates);
-    // Deviations from a common mean are not independent of each other.
-    const double few = replicates > 2
-                           ? static_cast<double>(replicates - 1) / static_cast<double>(replicates - 2)
-                           : std::numeric_limits<double>::infinity();
+SampleCounts Measure::counts(const RowList& column) const {
+    const std::size_t replicates = column.size();
     SampleCounts counts;
     counts.errors = replicates;
-    counts.widening = std::sqrt(few);
+    if (source_ == ErrorSource::Reference) {
+        counts = countsOfBias(replicates);
+    } else {
+        // Deviations from a common mean are not independent of each other.
+        const double few = replicates > 2
+                               ? static_cast<double>(replicates - 1) / static_cast<double>(replicates - 2)
+                               : std::numeric_limits<double>::infinity();
+        counts.widening = std::sqrt(few);
+    }
+    counts.widening *= fewPixelsWidening(column);
+    counts.unmet = column.front()->rare_luminance > 0;
     return counts;
+}
+
+/// Replicates of a few pixels often scatter as fewer values than an error needs to be known. Those that do
+/// not are a selection: their scatter is too small by chance, and so are intervals from it. Normal squares
+/// over K pixels have the relative variance 2/K. Their mean is independent of their relative scatter (Basu
+/// 1955, Sankhyā 15), so that intervals as wide as this hold in any such selection.
+double Measure::fewPixelsWidening(const RowList& column) const {
+    if (!hasFewPixels(column)) return 1;
+    const stats::Summary squares = stats::summarize(variancesOf(column));
+    const double scatter = squares.variance / (squares.mean * squares.mean);
+    return std::sqrt(std::max(1.0, 2 / *column.front()->effective_pixels / scatter));
+}
+
+bool Measure::hasFewPixels(const RowList& column) {
+    constexpr double kFewPixels = 6;  // From here on 99 % of normal images have an error that is known.
+    return column.size() >= 3 && column.front()->effective_pixels.value_or(kFewPixels) < kFewPixels;
+}
+
+std::vector<double> Measure::variancesOf(const RowList& column) const {
+    std::vector<double> variances;
+    for (const Row* row : column) variances.push_back(variance(*row));
+    return variances;
+}
+
+double Measure::unmet(const Row& row, std::size_t replicates) const {
+    const double of_path = row.rare_luminance / static_cast<double>(row.samples) / scale_;
+    return kUnmet * of_path * of_path / (pixels_ * static_cast<double>(replicates));
+}
+
+std::string Measure::unmetReason(const RowList& column) const {
+    // A heavy tail that is seen in fewer values has not shown its end (decision 0078).
+    constexpr double kFewestOfHeavyTail = 500;
+    const Row& row = *column.front();
+    if (row.rare_luminance > 0) {
+        // Without a variance between replicates their squared error stands in for it.
+        const double noise = meanOver(allOf(column.size()), [&](std::size_t r) {
+            return column[r]->between_replicates_mse ? variance(*column[r]) : mse(*column[r], 0);
+        });
+        if (noise >= unmet(row, column.size())) return {};
+        return "its noise is less than that of three of the scene's brightest paths, so some may not have "
+               "been sampled";
+    }
+    if (row.heavy_tail_values && *row.heavy_tail_values < kFewestOfHeavyTail)
+        return fmt::format(
+            "the noise of its pixels has a heavy tail and only {:.0f} degrees of freedom, and {} are needed",
+            *row.heavy_tail_values, kFewestOfHeavyTail);
+    return {};
 }
 
 double Measure::mse(const Row& row, std::size_t reference_part) const {
@@ -195,17 +251,21 @@ Estimate Measure::noNarrowerThanNoBias(const Estimate& estimate, double variance
 ErrorModel::ErrorModel(Block block, const Measure& measure) : block_(std::move(block)), measure_(measure) {
     const std::vector<std::size_t> all = allOf(block_.replicates());
     for (std::size_t i = 0; i < block_.columns(); ++i) {
+        if (!measure_.unmetReason(column(i)).empty()) first_known_ = i + 1;
         const Statistic error = [&, i](const Resample& resample) { return errors(resample)[i]; };
         seen_.push_back(error({all, {}, 0}) > 3 * foldError(counts(), error));
     }
+    std::fill_n(seen_.begin(), first_known_, false);
 }
 
 std::vector<double> ErrorModel::errors(const Resample& resample) const {
     std::vector<double> means(block_.columns());
-    for (std::size_t i = 0; i < means.size(); ++i)
+    for (std::size_t i = 0; i < means.size(); ++i) {
         means[i] = meanOver(resample.errors, [&](std::size_t r) {
             return measure_.mse(*block_.rows[r][i], resample.reference_part);
         });
+        if (resample.unmet) means[i] += measure_.unmet(*block_.rows.front()[i], block_.replicates());
+    }
     return means;
 }
 
@@ -252,8 +312,9 @@ double ErrorModel::varianceOfBias() const {
 
 double ErrorModel::samplesTo(const Resample& resample, double target, bool extrapolate) const {
     std::vector<double> mse = errors(resample);
-    if (mse[0] <= target) return block_.samples[0];
-    for (std::size_t i = 1; i < mse.size(); ++i) {
+    if (first_known_ == mse.size()) return kNaN;
+    if (mse[first_known_] <= target) return block_.samples[first_known_];
+    for (std::size_t i = first_known_ + 1; i < mse.size(); ++i) {
         if (!(mse[i] <= target)) continue;
         const double low = std::max(mse[i], 1e-3 * target);  // Not above 0 below the reference's noise.
         const double share = std::log(target / mse[i - 1]) / std::log(low / mse[i - 1]);
@@ -269,14 +330,14 @@ double ErrorModel::samplesBeyond(const Resample& resample, double target, double
 
 double ErrorModel::lastPower(const Resample& resample) const {
     const std::vector<double> mse = errors(resample);
-    const auto first = static_cast<std::ptrdiff_t>(mse.size() > 4 ? mse.size() - 4 : 0);
+    const std::size_t fourth = mse.size() > 4 ? mse.size() - 4 : 0;
+    const auto first = static_cast<std::ptrdiff_t>(std::max(fourth, first_known_));
     return logSlope({block_.samples.begin() + first, block_.samples.end()},
                     {mse.begin() + first, mse.end()});
 }
 
 double ErrorModel::valuesOfError() const {
-    std::vector<double> squares;
-    for (const RowList& rows : block_.rows) squares.push_back(measure_.variance(*rows.back()));
+    const std::vector<double> squares = measure_.variancesOf(lastColumn());
     if (squares.size() < 3) return std::numeric_limits<double>::infinity();
     const stats::Summary summary = stats::summarize(squares);
     double farthest = 0;
@@ -302,6 +363,16 @@ std::array<double, 2> ErrorModel::slopeSamples() const {
         range[1] = block_.samples[i];
     }
     return range;
+}
+
+bool ErrorModel::reachesAtOnce(double target) const {
+    return first_known_ < block_.columns() && errors({allOf(replicates()), {}, 0})[first_known_] <= target;
+}
+
+RowList ErrorModel::column(std::size_t index) const {
+    RowList rows;
+    for (const RowList& of_replicate : block_.rows) rows.push_back(of_replicate[index]);
+    return rows;
 }
 
 double ErrorModel::weighted(const std::vector<double>& of_columns) const {

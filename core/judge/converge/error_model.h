@@ -13,6 +13,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <string>
 #include <vector>
 
 namespace crt::converge {
@@ -58,9 +59,12 @@ public:
     /// Errors are the spread between replicates from now on; the reference judges bias only.
     void measureErrorsBetweenReplicates() { source_ = ErrorSource::BetweenReplicates; }
     bool usable() const { return scale_ > 0; }
-    /// Of the rows' errors over this number of replicates.
-    SampleCounts counts(std::size_t replicates) const;
-    /// Of biasSquared(), which always knows the reference.
+    /// True if so few pixels have most of the variance that their replicates often scatter as fewer values
+    /// than an error needs to be known.
+    static bool hasFewPixels(const RowList& column);
+    /// Of the errors of a column.
+    SampleCounts counts(const RowList& column) const;
+    /// Of biasSquared(), which always has the reference.
     SampleCounts countsOfBias(std::size_t replicates) const;
 
     /// Relative mean squared error against part of the reference (Resample::reference_part), its noise
@@ -68,6 +72,15 @@ public:
     double mse(const Row& row, std::size_t reference_part) const;
     /// Variance between replicates.
     double variance(const Row& row) const;
+    std::vector<double> variancesOf(const RowList& column) const;
+    /// Mean squared error, over this number of replicates, of kUnmet paths that are as bright as the scene's
+    /// brightest, where these are rare. Up to this number may be missing.
+    double unmet(const Row& row, std::size_t replicates) const;
+    /// Reason why paths that no replicate has met may carry much of the error of a column: one sentence
+    /// without a full stop; empty if that is not likely. Where the scene has rare bright paths the noise
+    /// must amount to unmet(), as that of images (decision 0061). Elsewhere a heavy tail must have enough
+    /// degrees of freedom (decision 0078).
+    std::string unmetReason(const RowList& column) const;
     /// Their difference: its mean over replicates estimates the squared bias.
     double biasSquared(const Row& row, std::size_t reference_part) const {
         return referenceMse(row, reference_part) - variance(row);
@@ -88,6 +101,7 @@ private:
         double scale = 1;
     };
     void divideReference();
+    double fewPixelsWidening(const RowList& column) const;
     double referenceMse(const Row& row, std::size_t reference_part) const;
 
     ErrorSource source_ = ErrorSource::BetweenReplicates;
@@ -107,11 +121,16 @@ public:
 
     std::size_t replicates() const { return block_.replicates(); }
     const std::vector<double>& samples() const { return block_.samples; }
-    SampleCounts counts() const { return measure_.counts(block_.replicates()); }
+    SampleCounts counts() const { return measure_.counts(lastColumn()); }
 
     /// Relative MSE of the columns, mean over replicates.
     std::vector<double> errors(const Resample& resample) const;
-    /// Columns whose error stands out of the reference's noise; nothing relative can be said of the others.
+    /// Measure::unmetReason() of the last column. Columns before one with a reason are left out of all fits.
+    std::string unmetReason() const { return measure_.unmetReason(lastColumn()); }
+    /// True if the error is at most `target` in the first column that is in fits.
+    bool reachesAtOnce(double target) const;
+    /// Known columns whose error stands out of the reference's noise; nothing relative can be said of the
+    /// others.
     const std::vector<bool>& seen() const { return seen_; }
 
     /// Intercept b², slope v. NaN with fewer than three columns.
@@ -131,7 +150,7 @@ public:
     double samplesTo(const Resample& resample, double target, bool extrapolate) const;
     /// The same beyond the last column, where squared error falls with N to this power.
     double samplesBeyond(const Resample& resample, double target, double power) const;
-    /// Power of N by which squared error falls over the last four columns.
+    /// Power of N by which squared error falls over the last four columns, of known ones.
     double lastPower(const Resample& resample) const;
     /// The number of normal values of one variance that would make the squared error of an image scatter as
     /// it does between the replicates of the last column (Satterthwaite's 2 S²/Var S). With one half more
@@ -145,9 +164,12 @@ public:
 
 private:
     double weighted(const std::vector<double>& of_columns) const;
+    RowList column(std::size_t index) const;
+    RowList lastColumn() const { return column(block_.columns() - 1); }
 
     Block block_;
     const Measure& measure_;
+    std::size_t first_known_ = 0;  ///< From this column on, none has an unmetReason().
     std::vector<bool> seen_;
 };
 

@@ -83,7 +83,9 @@ Json rowJson(const Row& row) {
     for (const double mse : row.fold_mse) json["fold_mse"].push_back(number(mse));
     json["between_replicates_mse"] = number(row.between_replicates_mse);
     json["effective_pixels"] = number(row.effective_pixels);
+    json["heavy_tail_values"] = number(row.heavy_tail_values);
     json["predicted_relative_rmse"] = interval(row.predicted_relative_rmse);
+    json["rare_luminance"] = number(row.rare_luminance);
     json["mean_luminance"] = number(row.mean_luminance);
     json["image_mean"] = numbers(row.image_mean);
     json["image_mean_standard_error"] =
@@ -114,9 +116,11 @@ Row rowOf(const Json& json) {
     for (const Json& mse : json.at("fold_mse")) row.fold_mse.push_back(numberIn(mse));
     row.between_replicates_mse = knownNumberIn(json.at("between_replicates_mse"));
     row.effective_pixels = knownNumberIn(json.at("effective_pixels"));
+    row.heavy_tail_values = knownNumberIn(json.at("heavy_tail_values"));
     if (const Json& predicted = json.at("predicted_relative_rmse"); !predicted.is_null())
         row.predicted_relative_rmse = Estimate{
             numberIn(predicted.at("value")), numberIn(predicted.at("low")), numberIn(predicted.at("high"))};
+    row.rare_luminance = numberIn(json.at("rare_luminance"));
     row.mean_luminance = numberIn(json.at("mean_luminance"));
     row.image_mean = numbersIn(json.at("image_mean"));
     if (const Json& error = json.at("image_mean_standard_error"); !error.is_null())
@@ -201,6 +205,8 @@ const std::vector<Column>& csvColumns() {
         {"predicted_relative_rmse_low", predictionField(&Estimate::low)},
         {"predicted_relative_rmse_high", predictionField(&Estimate::high)},
         {"effective_pixels", [](const Row& r) { return csvField(r.effective_pixels); }},
+        {"heavy_tail_values", [](const Row& r) { return csvField(r.heavy_tail_values); }},
+        {"rare_luminance", [](const Row& r) { return csvField(r.rare_luminance); }},
         {"mean_luminance", [](const Row& r) { return csvField(r.mean_luminance); }},
         {"image_mean_r", [](const Row& r) { return csvField(r.image_mean[0]); }},
         {"image_mean_g", [](const Row& r) { return csvField(r.image_mean[1]); }},

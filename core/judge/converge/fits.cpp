@@ -67,6 +67,7 @@ public:
     /// Reason why no interval of the error can be trusted; empty if they can. Rare bright paths that carry
     /// the variance are met by few of the replicates, or only as samples become more.
     std::string unknownError() const {
+        if (std::string reason = error_.unmetReason(); !reason.empty()) return reason;
         constexpr double kFewestValues = 2;  // As for an image (film/error_estimate.h).
         if (const double values = error_.valuesOfError(); values < kFewestValues)
             return fmt::format(
@@ -117,7 +118,7 @@ public:
         // Measurements of another backend with the same bits hold for this one.
         const double measured = error_.samplesTo({all, {}, 0}, mse, false);
         target.reached = std::isfinite(measured) && measured <= time_.lastSamples();
-        target.at_first_point = error_.errors({all, {}, 0}).front() <= mse;
+        target.at_first_point = error_.reachesAtOnce(mse);
         if (!target.reached) {
             if (!error.flattening || error.floor().low < mse) forecast(target, mse);
             return target;
@@ -300,7 +301,13 @@ void makePoints(Subject& subject, const FitOptions& options) {
         const RowList errors = rowsOf(found->second), times = rowsOf(of_replicates);
         subject.fit.points.push_back(
             makePoint(samples, errors, times, *subject.measure, subject.reference, options));
-        if (!subject.fit.unknown_error.empty()) forgetErrors(subject.fit.points.back());
+        Point& point = subject.fit.points.back();
+        const bool met = subject.measure->unmetReason(errors).empty();
+        if (met && subject.fit.unknown_error.empty()) continue;
+        forgetErrors(point);
+        // Paths that were not sampled are missing from the mean, too.
+        if (point.mean_bias && (!met || errors.front()->rare_luminance > 0))
+            *point.mean_bias = {point.mean_bias->value, -kInfinity, kInfinity};
     }
 }
 

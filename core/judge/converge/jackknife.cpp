@@ -26,6 +26,7 @@ public:
         : errors_(allOf(counts.errors)), times_(allOf(counts.times)), statistic_(statistic), scale_(scale) {}
 
     double whole() const { return onScale({errors_, times_, 0}); }
+    double withUnmet() const { return onScale({errors_, times_, 0, true}); }
 
     Component errors(double whole) const {
         return of(errors_, whole, [&](Indices rest) { return onScale({rest, times_, 0}); });
@@ -114,7 +115,9 @@ Estimate jackknife(const SampleCounts& counts, const Statistic& statistic, Scale
     const auto back = [&](double value) { return scale == Scale::Logarithmic ? std::exp(value) : value; };
     if (!std::isfinite(sum.variance)) return {back(whole), back(-kInfinity), kInfinity};
     const double quantile = sum.variance > 0 ? stats::studentQuantile(0.5 + 0.5 * confidence, sum.dof) : 0;
-    const double half = quantile * std::sqrt(sum.variance);
+    const double of_unmet = counts.unmet ? parts.withUnmet() - whole : 0;
+    const double half = std::hypot(quantile * std::sqrt(sum.variance), of_unmet);
+    if (!std::isfinite(half)) return {back(whole), back(-kInfinity), kInfinity};
     return {back(whole), back(whole - half), back(whole + half)};
 }
 

@@ -21,6 +21,7 @@ using Indices = std::span<const std::size_t>;
 struct Resample {
     Indices errors, times;
     std::size_t reference_part = 0;  ///< 0: all folds; k + 1: without fold k.
+    bool unmet = false;  ///< With the squared error of paths that may be missing (Measure::unmet()).
 };
 using Statistic = std::function<double(const Resample&)>;
 
@@ -29,6 +30,7 @@ struct SampleCounts {
     std::size_t errors = 0, times = 0, folds = 0;
     /// Of the standard error that replicates of errors cause; infinite where nothing is known of it.
     double widening = 1;
+    bool unmet = false;  ///< Paths may be missing. The half width includes their effect, in quadrature.
 };
 
 enum class Scale { Linear, Logarithmic };

@@ -80,9 +80,14 @@ struct Row {
     std::optional<double> between_replicates_mse;
     /// stats::effectivePixels of that variance; known with it.
     std::optional<double> effective_pixels;
+    /// stats::SquaredNoise::heavyTailValues() of all replicates. Known with between_replicates_mse.
+    std::optional<double> heavy_tail_values;
     std::optional<Estimate>
         predicted_relative_rmse;  ///< The error that the image states, from its own scrambles.
 
+    /// Luminance that one of the scene's brightest paths adds to a sample where such paths are rare
+    /// (film/path_facts.h), in the unit of mean_luminance; 0 where they are not.
+    double rare_luminance = 0;
     double mean_luminance = 0;
     /// R, G, B. Against a closed form, all three are mean luminance.
     std::array<double, 3> image_mean{0, 0, 0};

@@ -9,11 +9,12 @@
 namespace crt::converge {
 namespace {
 
-/// √ of a mean squared error. In logarithms where the error is known well; else from a line, which may
-/// begin at 0: below the reference's own noise there is no logarithm.
-Estimate rootOf(const SampleCounts& counts, const Statistic& mse, double confidence) {
+/// √ of a mean squared error. In logarithms where the error is known well, or where a few pixels make it
+/// scatter as χ², whose upper end a line does not reach; else from a line, which may begin at 0: below the
+/// reference's own noise there is no logarithm.
+Estimate rootOf(const SampleCounts& counts, const Statistic& mse, bool few_pixels, double confidence) {
     const Estimate e = jackknife(counts, mse, Scale::Linear, confidence);
-    if (e.low > 0.25 * e.value) {
+    if (e.low > 0.25 * e.value || (few_pixels && counts.folds == 0 && e.value > 0)) {
         const Statistic root = [&](const Resample& resample) { return std::sqrt(mse(resample)); };
         return jackknife(counts, root, Scale::Logarithmic, confidence);
     }
@@ -56,7 +57,7 @@ public:
         point.replicates = static_cast<std::uint32_t>(times_.size());
         point.seconds = timeOf([this](const Resample& r) { return secondsWithStart(r); });
         point.render_seconds = timeOf([this](const Resample& r) { return renderSeconds(r); });
-        point.relative_rmse = rootOf(counts(), mse(), options_.confidence);
+        point.relative_rmse = rootOf(counts(), mse(), Measure::hasFewPixels(errors_), options_.confidence);
         SampleCounts both = counts();
         both.times = times_.size();
         const Statistic squares = mse();
@@ -79,12 +80,13 @@ public:
     }
 
 private:
-    SampleCounts counts() const { return measure_.counts(errors_.size()); }
+    SampleCounts counts() const { return measure_.counts(errors_); }
     Statistic mse() const {
         return [this](const Resample& resample) {
-            return meanOver(resample.errors, [&](std::size_t r) {
-                return measure_.mse(*errors_[r], resample.reference_part);
-            });
+            const double unmet = resample.unmet ? measure_.unmet(*errors_.front(), errors_.size()) : 0;
+            return unmet + meanOver(resample.errors, [&](std::size_t r) {
+                       return measure_.mse(*errors_[r], resample.reference_part);
+                   });
         };
     }
     double renderSeconds(const Resample& resample) const {
