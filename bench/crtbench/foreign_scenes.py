@@ -62,7 +62,7 @@ class Scene:
         self.name = str(path.relative_to(folder))
         self.ratio = self.black = self.white = None
         self.stand_ins = [file.name for file in stand_ins(folder) if path.parent in file.parents]
-        self.losses, self.warnings, self.error = [], [], None
+        self.losses, self.notes, self.warnings, self.error = [], [], [], None
         made = program.scratch / "scene.yaml"
         done = self.run(program, [sys.executable, "-m", "crt", "import", path, "-o", made, "--overwrite"])
         said = done.stderr.replace(f"{path.parent}/", "")
@@ -70,7 +70,8 @@ class Scene:
             self.verdict, self.error = f"import ends with {done.returncode}", last_error(said)
             return
         self.losses = re.findall(r"^crt: warning: the picture changes a lot: (.*)", said, re.MULTILINE)
-        self.little = len(re.findall(r"^crt: not imported: ", said, re.MULTILINE))
+        self.notes = [note for note in re.findall(r"^crt: not imported: (.*)", said, re.MULTILINE)
+                      if "integrator" not in note]
         image, shown = program.scratch / "scene.pfm", program.scratch / "scene.ppm"
         width, height = size_of(made)
         scale = SIDE / max(width, height)
@@ -112,6 +113,18 @@ class Scene:
         refused = self.verdict.endswith("with 3") and bool(self.error)
         return refused or self.verdict == "renders" and self.says_why()
 
+    def is_compared(self):
+        return self.ratio is not None and math.isfinite(self.ratio) and not self.stand_ins
+
+    def is_close(self):
+        return self.is_compared() and abs(self.ratio - 1) <= CLOSE
+
+    def why(self):
+        """The causes of a difference from the reference, in one text."""
+        losses = [re.sub(r"^[^ ]+:\d+: ", "", loss) for loss in self.losses or self.notes]
+        cause = next((cause for end, cause in causes().items() if self.name.endswith(end)), None)
+        return "; ".join(filter(None, [self.error, cause, *losses]))
+
 
 JUDGE = """
 import json, pathlib, sys
@@ -139,19 +152,6 @@ def size_of(scene):
 def last_error(said):
     errors = re.findall(r"error: (.*)", said)
     return errors[-1] if errors else said.strip()[-200:]
-
-
-    def is_compared(self):
-        return self.ratio is not None and math.isfinite(self.ratio) and not self.stand_ins
-
-    def is_close(self):
-        return self.is_compared() and abs(self.ratio - 1) <= CLOSE
-
-    def why(self):
-        """The causes of a difference from the reference, in one text."""
-        losses = [re.sub(r"^[^ ]+:\d+: ", "", loss) for loss in self.losses]
-        cause = next((cause for end, cause in causes().items() if self.name.endswith(end)), None)
-        return "; ".join(filter(None, [self.error, cause, *losses]))
 
 
 def by_repository(found):

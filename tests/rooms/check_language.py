@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """Messages, pages and comments are in plain English: sentences with a subject and a verb, no persons for
-things, no idioms. CONTRIBUTING.md has the rules with examples. Messages and pages may break none of the
-patterns below; comments break COMMENTS of them, a number that may only fall. Exit code 1 names the lines.
+things, no idioms. CONTRIBUTING.md has the rules with examples. None may break one of the patterns below.
+Exit code 1 names the lines.
 
-tests/rooms/check_language.py [--comments] [--root FOLDER] [FOLDER...]   only these; also of comments
+tests/rooms/check_language.py [--root FOLDER] [FOLDER...]   only these
 """
 
 import argparse
@@ -21,9 +21,6 @@ FOLDERS = ("bench", "core", "docs", "plugins", "python", "scripts", "tests", "ve
 PAGES = ("README.md", "CONTRIBUTING.md")
 # Texts that a user sees: strings of these folders, except of tests.
 SEEN = ("core", "plugins", "python/crt", "python/src", "verify")
-# With separate bounds, which may only fall. In core/kernel a string of features.h is left.
-LATER = {"core/kernel": 1}
-COMMENTS = 0
 # The rules quote what they forbid.
 QUOTES = {"CONTRIBUTING.md", "tests/rooms/check_language.py", "tests/rooms/test_language.py"}
 
@@ -88,9 +85,6 @@ def has_main_clause(kind, sentence):
 
 
 def area(name, kind):
-    for folder in LATER:
-        if name == folder or name.startswith(folder + "/"):
-            return folder
     if kind == "comment":
         return "comments"
     if kind == "message" and not (name.startswith(tuple(f + "/" for f in SEEN)) and "/tests/" not in name):
@@ -125,23 +119,15 @@ def main():
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--comments", action="store_true")
     parser.add_argument("--root", type=pathlib.Path, default=ROOT)
     parser.add_argument("folders", nargs="*")
     arguments = parser.parse_args()
     number, found = check(arguments.root.resolve(), arguments.folders or FOLDERS + PAGES)
-    bounds = {"messages and pages": 0, "comments": COMMENTS, **LATER}
-    wrong = False
-    for where, bound in bounds.items():
-        lines = found[where]
-        too_many = not arguments.folders and len(lines) > bound
-        wrong |= too_many
-        if arguments.comments or arguments.folders or too_many:
-            print("\n".join(lines))
-        lower = f"; set the bound to {len(lines)}" if len(lines) < bound and not arguments.folders else ""
-        print(f"{where}: {len(lines)} of at most {bound}{lower}")
+    for where, lines in sorted(found.items()):
+        print("\n".join(lines))
+        print(f"{where}: {len(lines)}")
     print(f"{number} files")
-    return 1 if wrong or not number else 0
+    return 1 if found or not number else 0
 
 
 if __name__ == "__main__":

@@ -44,7 +44,7 @@
     F(15, FILTER, "pixel filter other than the box")                                         \
     F(16, VIEW, "normals and bounding-box views")                                            \
     F(17, AOV, "albedo, normal, depth and primitive outputs")                                \
-    F(18, REPLICATES, "independent replicates, from which the image knows its error")        \
+    F(18, REPLICATES, "independent replicates, from which the error is estimated")           \
     F(20, TABLE, "values tabulated by wavelength")                                           \
     F(22, ENVIRONMENT_LIGHT, "light sampling of the environment")                            \
     F(26, MEDIA, "what bodies of glass hold: absorption, holes in their surface")            \

@@ -28,8 +28,8 @@ CRT_FN void crt_resolve_shadow(const CrtContext *ctx, CrtPath *path, const CrtSh
     if (!blocked) path->radiance = path->radiance + shadow->radiance;
 }
 
-/* crt_path_advance where rays may pass surfaces. One loop traces the path's ray, then the shadow ray: both go
-   on until something stops them. */
+/* crt_path_advance where rays may pass surfaces. One loop traces the path's ray, then the shadow ray: both
+   go on until something stops them. */
 CRT_FN int crt_path_advance_passing(const CrtContext *ctx, CrtPath *path, CrtRayCount *rays) {
     CrtShadow shadow;
     CrtRay ray = path->ray;
