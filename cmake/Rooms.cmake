@@ -1,10 +1,11 @@
-# The rooms of core/: one folder, one target, and the arrows between them.
+# The rooms of core/ and plugins/: one folder, one target, and the arrows between them.
 #
 #   crt_room(<folder> [SOURCES <file>…] [USES <folder>…] [LIBRARIES <target>…]
-#            [HEADERS <file of core/>…] [COLD <file>…|ALL])
+#            [HEADERS <file>…] [COLD <file>…|ALL])
 #
-# makes the static library crt_<folder> (a '/' becomes '_') of core/<folder>, or an interface library where
-# it has headers alone, which are then compiled once for themselves. HEADERS are further ones that it shows.
+# makes the static library crt_<folder> (a '/' becomes '_') of a folder below the one that calls, or an
+# interface library where it has headers alone, which are then compiled once for themselves. HEADERS are
+# further ones that it shows, named as from there.
 # COLD: files in which nothing takes time; they are compiled for size. Its headers are included as
 # "<folder>/<name>.h". Each room has an include root of its own, build/rooms/<target>, which holds links to
 # its headers and to nothing else: a file sees the headers of the rooms that its own room USES, and of those
@@ -13,17 +14,17 @@
 
 set_property(GLOBAL PROPERTY CRT_ROOMS "")
 
-# build/rooms/<target>/<folder>/<name>.h → core/<folder>/<name>.h, for every header of the room.
+# build/rooms/<target>/<folder>/<name>.h → <folder>/<name>.h, for every header of the room.
 function(_crt_link_headers target folder)
   set(root ${PROJECT_BINARY_DIR}/rooms/${target})
-  file(GLOB headers CONFIGURE_DEPENDS RELATIVE ${PROJECT_SOURCE_DIR}/core
-    ${PROJECT_SOURCE_DIR}/core/${folder}/*.h)
+  file(GLOB headers CONFIGURE_DEPENDS RELATIVE ${CMAKE_CURRENT_SOURCE_DIR}
+    ${CMAKE_CURRENT_SOURCE_DIR}/${folder}/*.h)
   list(APPEND headers ${ARGN})
   foreach(header IN LISTS headers)
     if(NOT EXISTS ${root}/${header})
       get_filename_component(directory ${root}/${header} DIRECTORY)
       file(MAKE_DIRECTORY ${directory})
-      file(CREATE_LINK ${PROJECT_SOURCE_DIR}/core/${header} ${root}/${header} SYMBOLIC)
+      file(CREATE_LINK ${CMAKE_CURRENT_SOURCE_DIR}/${header} ${root}/${header} SYMBOLIC)
     endif()
   endforeach()
   file(GLOB_RECURSE there RELATIVE ${root} ${root}/*.h)
@@ -36,7 +37,7 @@ endfunction()
 # The cold files of a room, for size: a target of their own, so that they too can be compiled several at a
 # time.
 function(_crt_cold_part target folder)
-  list(TRANSFORM ARGN PREPEND ${PROJECT_SOURCE_DIR}/core/${folder}/)
+  list(TRANSFORM ARGN PREPEND ${CMAKE_CURRENT_SOURCE_DIR}/${folder}/)
   add_library(${target}_cold OBJECT ${ARGN})
   target_compile_options(${target}_cold PRIVATE $<$<CONFIG:Release>:-Os>)
   target_link_libraries(${target}_cold PRIVATE crt_flags)
@@ -48,8 +49,8 @@ endfunction()
 
 # Compiles the headers of a room that has nothing else, with no other include roots than those it sees.
 function(_crt_compile_headers target folder)
-  file(GLOB headers CONFIGURE_DEPENDS RELATIVE ${PROJECT_SOURCE_DIR}/core
-    ${PROJECT_SOURCE_DIR}/core/${folder}/*.h)
+  file(GLOB headers CONFIGURE_DEPENDS RELATIVE ${CMAKE_CURRENT_SOURCE_DIR}
+    ${CMAKE_CURRENT_SOURCE_DIR}/${folder}/*.h)
   list(TRANSFORM headers REPLACE "(.+)" "#include \"\\1\"\n")
   list(JOIN headers "" text)
   set(file ${PROJECT_BINARY_DIR}/generated/rooms/${target}_headers.cpp)
@@ -77,7 +78,7 @@ function(crt_room folder)
     if(NOT arg_COLD STREQUAL "ALL")
       list(REMOVE_ITEM arg_SOURCES ${arg_COLD})
     endif()
-    list(TRANSFORM arg_SOURCES PREPEND ${PROJECT_SOURCE_DIR}/core/${folder}/)
+    list(TRANSFORM arg_SOURCES PREPEND ${CMAKE_CURRENT_SOURCE_DIR}/${folder}/)
     add_library(${target} STATIC ${arg_SOURCES})
     target_include_directories(${target} PUBLIC ${PROJECT_BINARY_DIR}/rooms/${target})
     target_link_libraries(${target} PUBLIC ${used} ${arg_LIBRARIES} PRIVATE crt_flags)

@@ -11,12 +11,12 @@
 // Exit code 77, which ctest shows as skipped, where NVRTC is missing.
 #include "cuda_nvrtc.h"
 #include "cuda_program.h"
-#include "cuda_wavefront.h"
 
 #include "backend/loader.h"
 #include "backend/sdk/gpu_schedule.h"
 #include "base/error.h"
 #include "compile/compile.h"
+#include "gpu/wave_plan.h"
 #include "kernel/dialect/features.h"
 #include "kernel/dialect/layout.h"
 #include "render/outputs.h"
@@ -36,8 +36,8 @@
 
 namespace {
 
-using crt::plugin::Entry;
-using crt::plugin::KernelSpec;
+using crt::gpu::Entry;
+using crt::gpu::KernelSpec;
 
 constexpr int kSkipped = 77;
 
@@ -114,7 +114,7 @@ void addScene(const crt::CompiledScene& scene, const std::string& name, Variants
     const crt::kernel::CrtScene& header = scene.header();
     if (!crt::wantsWavefront(header.features, header.max_depth))
         return add({Entry::Render, header.features}, name, variants);
-    for (const KernelSpec& kernel : crt::plugin::planWave(scene.data()).kernels) add(kernel, name, variants);
+    for (const KernelSpec& kernel : crt::gpu::planWave(scene.data()).kernels) add(kernel, name, variants);
 }
 
 std::string textOf(const char* path) {
@@ -176,7 +176,7 @@ int run(int argc, char** argv) {
     for (const auto& [key, name] : variants) {
         if (number++ % parts != part - 1) continue;
         const KernelSpec spec{static_cast<Entry>(key.first), key.second};
-        const std::string entry = crt::plugin::entryName(spec.entry);
+        const std::string entry = crt::gpu::entryName(spec.entry);
         const auto start = std::chrono::steady_clock::now();
         // The one with everything in is compiled ahead of time, for three blocks (its CMakeLists.txt).
         const bool full = spec.features == CRT_FEATURES_ALL;

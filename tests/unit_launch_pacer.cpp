@@ -1,7 +1,7 @@
 // Launch pacing: whatever the budget does, every sample of every pixel is launched exactly once.
 #include "backend/sdk/launch_pacer.h"
-#include "common/film_slices.h"
 #include "catch.h"
+#include "gpu/film_slices.h"
 #include "render_range.h"
 
 #include <cmath>
@@ -130,7 +130,7 @@ TEST_CASE("a huge range neither overflows nor is cut into nothing", "[launch_pac
 }
 
 TEST_CASE("slices fill a device with few pixels, and cost no more memory than allowed", "[launch_pacer]") {
-    using crt::plugin::chooseSlices;
+    using crt::gpu::chooseSlices;
     // 1000 blocks at once, filled 16 times.
     CHECK(chooseSlices(16'000, 1000, 1 << 20, 1000) == 1);
     CHECK(chooseSlices(1000, 1000, 1 << 20, 1000) == 16);
@@ -140,7 +140,7 @@ TEST_CASE("slices fill a device with few pixels, and cost no more memory than al
     CHECK(chooseSlices(1, 1 << 20, 1u << 31, ~std::uint64_t{0}) == 65535);  // rows of a grid
     CHECK(chooseSlices(10, 1000, 1, 0) == 1);
 
-    using crt::plugin::sliceBudget;
+    using crt::gpu::sliceBudget;
     constexpr std::uint64_t GiB = std::uint64_t{1} << 30;
     CHECK(sliceBudget(80 * GiB, 80 * GiB) == GiB / 2);
     CHECK(sliceBudget(4 * GiB, 4 * GiB) == GiB / 4);

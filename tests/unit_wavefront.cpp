@@ -1,7 +1,7 @@
 // Scenes that a GPU renders in waves, and the kernels that they need.
 #include "backend/sdk/gpu_schedule.h"
-#include "common/wave_plan.h"
 #include "compiled_scenes.h"
+#include "gpu/wave_plan.h"
 
 #include <algorithm>
 #include <set>
@@ -32,10 +32,10 @@ TEST_CASE("waves are for paths without end", "[wavefront]") {
     CHECK_FALSE(wantsWavefront(one | CRT_FEATURE_VIEW, 1'000'000'000));
 }
 
-using crt::plugin::Entry;
-using crt::plugin::KernelSpec;
-using crt::plugin::planWave;
-using crt::plugin::WavePlan;
+using crt::gpu::Entry;
+using crt::gpu::KernelSpec;
+using crt::gpu::planWave;
+using crt::gpu::WavePlan;
 
 namespace {
 

@@ -13,7 +13,6 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <chrono>
 #include <cstring>
 #include <mutex>
 #include <stdexcept>
@@ -27,10 +26,6 @@ using plugin::KernelCache;
 
 /// A compiler that takes longer than this hangs. There may be no process left to end it.
 constexpr unsigned kMostSeconds = 120;
-
-double secondsSince(std::chrono::steady_clock::time_point start) {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
 
 /// A descriptor that closes itself.
 class Descriptor {
@@ -261,16 +256,16 @@ int runCompileProcess(int job_descriptor, int answer_descriptor) {
         const std::vector<unsigned char> key = request.next();
         std::copy_n(key.begin(), std::min(key.size(), job.key.size()), job.key.begin());
 
-        const auto compiling = std::chrono::steady_clock::now();
+        const gpu::Stopwatch compiling;
         const Cubin cubin = compileLean(Nvrtc::open({job.nvrtc_path}), job.text, job.arch, job.spec);
-        const double compile_seconds = secondsSince(compiling);
-        const auto storing = std::chrono::steady_clock::now();
+        const double compile_seconds = compiling.seconds();
+        const gpu::Stopwatch storing;
         KernelCache(job.cache_directory.empty() ? nullptr : job.cache_directory.c_str())
             .store(job.key, cubin.bytes.data(), cubin.bytes.size());
         answer.add(std::string());
         answer.add(cubin.bytes.data(), cubin.bytes.size());
         answer.addNumber(compile_seconds);
-        answer.addNumber(secondsSince(storing));
+        answer.addNumber(storing.seconds());
     } catch (const std::exception& error) {
         answer = Message();
         answer.add(std::string(error.what()));

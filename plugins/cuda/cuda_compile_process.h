@@ -10,7 +10,7 @@
 #include "cuda_nvrtc.h"
 
 #include "backend/sdk/kernel_cache.h"
-#include "common/kernel_spec.h"
+#include "gpu/gpu_program.h"
 
 #include <sys/types.h>
 
@@ -25,7 +25,7 @@ struct CompileJob {
     std::string nvrtc_path;  ///< As Nvrtc::path() has it.
     std::string text;
     int arch = 0;
-    plugin::KernelSpec spec;
+    gpu::KernelSpec spec;
     std::string
         cache_directory;  ///< Empty: none; then only the process that waits could use the kernel.
     plugin::KernelCache::Key key{};

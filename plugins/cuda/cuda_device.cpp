@@ -1,11 +1,15 @@
 #include "cuda_device.h"
 
+#include "cuda_program.h"
+
 #include "backend/sdk/plugin_guard.h"
+#include "gpu/device_list.h"
 
 #include <dlfcn.h>
 
-#include <cstdio>
+#include <cstddef>
 #include <fstream>
+#include <utility>
 
 namespace crt::cuda {
 
@@ -13,6 +17,7 @@ using plugin::PluginError;
 
 namespace {
 
+constexpr char kNoneUsable[] = "no GPU can be used";
 constexpr int kLeastArch = 75;  // the oldest that CUDA 13 compiles for, and the PTX that is always embedded
 
 std::string cudaVersionText(int version) {
@@ -80,6 +85,7 @@ std::vector<Device> listDevices() {
     const Driver& cuda = driver();
     int count = 0;
     cuda.check(cuda.cuDeviceGetCount(&count), "counting CUDA devices");
+    if (count == 0) throw PluginError(CRT_NO_DEVICE, "the NVIDIA driver is installed but sees no GPU");
     std::vector<Device> devices;
     for (int index = 0; index < count; ++index) {
         Device device;
@@ -130,89 +136,110 @@ CrtDevice Device::describe() const {
     return plugin::makeDevice(index, name, driver().version, memory_bytes, 3000.0 + multiprocessors);
 }
 
-std::vector<Device> usableDevices() {
-    std::vector<Device> usable;
-    std::string others;
-    for (const Device& device : listDevices()) {
-        if (device.unusable.empty())
-            usable.push_back(device);
-        else
-            others += (others.empty() ? "" : ", ") + std::to_string(device.index) + " '" + device.name +
-                      "' " + device.unusable;
-    }
-    if (usable.empty())
-        throw PluginError(CRT_NO_DEVICE, others.empty() ? "the NVIDIA driver is installed but sees no GPU"
-                                                        : "no GPU can be used: " + others);
-    return usable;
-}
-
-Device chooseDevice(const char* wanted) {
-    const std::vector<Device> usable = usableDevices();
-    std::vector<CrtDevice> described;
-    for (const Device& device : usable) described.push_back(device.describe());
-    const CrtDevice& chosen = plugin::chooseDevice(described, wanted);
-    return usable[static_cast<std::size_t>(&chosen - described.data())];
-}
-
-Context::Context(const Device& device) : device_(device.id) {
-    driver().check(driver().cuDevicePrimaryCtxRetain(&context_, device_), "opening '" + device.name + "'");
-}
-
-Context::~Context() { driver().cuDevicePrimaryCtxRelease(device_); }
-
-void Context::makeCurrent() const {
-    driver().check(driver().cuCtxSetCurrent(context_), "making the device current");
-}
+std::vector<Device> usableDevices() { return gpu::usable(listDevices(), kNoneUsable); }
 
 namespace {
 
-[[noreturn]] void refuseFor(std::uint64_t bytes, std::size_t free_bytes, std::size_t all_bytes,
-                            const Device& device, const char* what) {
-    throw PluginError(CRT_OUT_OF_MEMORY, std::string(what) + " needs " + megabytes(bytes) + ", but '" +
-                                             device.name + "' has only " + megabytes(free_bytes) +
-                                             " of its " + megabytes(all_bytes) + " free");
+/// The device's primary context, held open, and made current.
+std::shared_ptr<CUctx_st> openContext(const Device& device) {
+    const Driver& cuda = driver();
+    CUcontext context = nullptr;
+    cuda.check(cuda.cuDevicePrimaryCtxRetain(&context, device.id), "opening '" + device.name + "'");
+    std::shared_ptr<CUctx_st> held(context,
+                                   [id = device.id](CUcontext) { driver().cuDevicePrimaryCtxRelease(id); });
+    cuda.check(cuda.cuCtxSetCurrent(context), "making the device current");
+    return held;
 }
+
+std::shared_ptr<CUevent_st> makeEvent() {
+    CUevent event = nullptr;
+    // Waiting asleep: the host's cores have a kernel to compile.
+    driver().check(driver().cuEventCreate(&event, CU_EVENT_BLOCKING_SYNC), "creating an event");
+    return {event, [](CUevent made) { driver().cuEventDestroy(made); }};
+}
+
+CUdeviceptr addressOf(const GpuBuffer& buffer) { return reinterpret_cast<CUdeviceptr>(buffer.handle); }
 
 }  // namespace
 
-void requireFree(std::uint64_t bytes, const Device& device, const char* what) {
+CudaDevice::CudaDevice(const plugin::Host& host, const CrtCreateInfo& info)
+    : opening_compiler_(info.kernel == CRT_KERNEL_FULL ? std::jthread() : std::jthread(openCompiler)),
+      device_(gpu::choose(listDevices(), kNoneUsable, info.device)),
+      context_(openContext(device_)),
+      start_(makeEvent()),
+      end_(makeEvent()) {
+    if (info.threads != 0) host.log(CRT_LOG_DEBUG, "cuda: the number of threads does not apply");
+    traits_.backend = "cuda";
+    traits_.name = device_.name;
+    traits_.memory_bytes = device_.memory_bytes;
+    traits_.struct_arguments = true;
+    traits_.block_width = kBlockWidth;
+    traits_.block_height = kBlockHeight;
+    traits_.launch_seconds = 0.03;
+    traits_.first_paths = 1u << 18;
+    // One warp for each of the four schedulers of a multiprocessor: none waits for another's turn, so that a
+    // launch of this many paths takes as long as its longest one. Paths of 100,000 bounces take a second.
+    traits_.least_paths = std::uint64_t{4 * 32} * device_.multiprocessors;
+}
+
+void CudaDevice::makeCurrent() const {
+    driver().check(driver().cuCtxSetCurrent(context_.get()), "making the device current");
+}
+
+std::unique_ptr<gpu::GpuProgram> CudaDevice::makeProgram(const plugin::Host& host, const gpu::Specs& wanted,
+                                                         CrtKernelChoice choice) {
+    return std::make_unique<CudaProgram>(host, device_, wanted, choice);
+}
+
+std::uint64_t CudaDevice::freeBytes() const {
     std::size_t free_bytes = 0, all_bytes = 0;
     driver().check(driver().cuMemGetInfo(&free_bytes, &all_bytes), "querying free memory");
-    if (bytes > free_bytes) refuseFor(bytes, free_bytes, all_bytes, device, what);
+    return free_bytes;
 }
 
-Memory::Memory(std::uint64_t bytes, const Device& device, const char* what) {
+std::shared_ptr<void> CudaDevice::take(std::uint64_t bytes) {
+    CUdeviceptr address = 0;
+    const CUresult result = driver().cuMemAlloc(&address, bytes);
+    if (result == CUDA_ERROR_OUT_OF_MEMORY) return nullptr;
+    driver().check(result, "allocating " + std::to_string(bytes) + " bytes");
+    return {reinterpret_cast<void*>(address), [address](void*) { driver().cuMemFree(address); }};
+}
+
+void CudaDevice::fill(const GpuBuffer& to, unsigned char value, std::uint64_t first,
+                      std::uint64_t bytes) const {
+    driver().check(driver().cuMemsetD8(addressOf(to) + first, value, bytes), "clearing device memory");
+}
+
+void CudaDevice::write(const GpuBuffer& to, const void* from) const {
+    driver().check(driver().cuMemcpyHtoD(addressOf(to), from, to.bytes), "uploading");
+}
+
+void CudaDevice::read(const GpuBuffer& from, void* to, std::uint64_t first, std::uint64_t bytes) const {
+    driver().check(driver().cuMemcpyDtoH(to, addressOf(from) + first, bytes),
+                   "reading from '" + device_.name + "'");
+}
+
+void CudaDevice::launch(void* entry, const char* name, const gpu::GpuGrid& grid,
+                        const gpu::GpuArguments& arguments) {
+    pointers_.clear();
+    for (const gpu::GpuArgument& argument : arguments)
+        pointers_.push_back(const_cast<void*>(argument.value));
+    const CUresult result =
+        driver().cuLaunchKernel(static_cast<CUfunction>(entry), static_cast<unsigned>(grid.blocks),
+                                grid.rows, 1, grid.threads, 1, 1, 0, nullptr, pointers_.data(), nullptr);
+    if (result != CUDA_SUCCESS) driver().check(result, std::string("launching ") + name);
+}
+
+double CudaDevice::seconds(const std::function<void()>& start) {
     const Driver& cuda = driver();
-    const CUresult result = cuda.cuMemAlloc(&address_, bytes);
-    if (result == CUDA_ERROR_OUT_OF_MEMORY) {
-        std::size_t free_bytes = 0, all_bytes = 0;
-        cuda.cuMemGetInfo(&free_bytes, &all_bytes);
-        refuseFor(bytes, free_bytes, all_bytes, device, what);
-    }
-    cuda.check(result, "allocating " + megabytes(bytes) + " for " + what);
-    bytes_ = bytes;
-}
-
-Memory::~Memory() {
-    if (address_ != 0) driver().cuMemFree(address_);
-}
-
-void Memory::fill(unsigned char value) const {
-    driver().check(driver().cuMemsetD8(address_, value, bytes_), "clearing device memory");
-}
-
-void Memory::upload(const void* from) const {
-    driver().check(driver().cuMemcpyHtoD(address_, from, bytes_), "uploading");
-}
-
-void Memory::download(void* to) const {
-    driver().check(driver().cuMemcpyDtoH(to, address_, bytes_), "reading back");
-}
-
-std::string megabytes(std::uint64_t bytes) {
-    char text[32];
-    std::snprintf(text, sizeof text, "%.1f MB", static_cast<double>(bytes) / 1e6);
-    return text;
+    cuda.check(cuda.cuEventRecord(start_.get(), nullptr), "recording an event");
+    start();
+    cuda.check(cuda.cuEventRecord(end_.get(), nullptr), "recording an event");
+    cuda.check(cuda.cuEventSynchronize(end_.get()), "rendering on '" + device_.name + "'");
+    float milliseconds = 0;
+    cuda.check(cuda.cuEventElapsedTime(&milliseconds, start_.get(), end_.get()),
+               "reading the kernel's time");
+    return milliseconds * 1e-3;
 }
 
 }  // namespace crt::cuda

@@ -1,21 +1,24 @@
-/// The CUDA driver, found at run time, and its devices: listing, judging and choosing them, and what every
-/// other file here names it.
+/// The CUDA driver, found at run time, and its devices: listing, judging, choosing and opening them.
 ///
 /// Nothing is linked: libcuda.so.1 belongs to the display driver, and a plugin that needs it to load could
 /// not say that it is missing (docs/decisions/0006-cuda-driver-api.md).
 #pragma once
 
 #include "backend/crt_backend.h"
+#include "gpu/gpu_device.h"
 
 #include <cuda.h>
 
-#include <cstddef>
 #include <cstdint>
+#include <functional>
+#include <memory>
 #include <string>
-#include <utility>
+#include <thread>
 #include <vector>
 
 namespace crt::cuda {
+
+using gpu::GpuBuffer;
 
 // cuda.h turns some of these names into versioned ones (cuMemAlloc into cuMemAlloc_v2), here and wherever
 // they are called.
@@ -62,59 +65,34 @@ struct Device {
 /// The GPUs that can be used. Throws PluginError(CRT_NO_DEVICE) that says why when there is none.
 std::vector<Device> usableDevices();
 
-/// The device that --device means (crt::plugin::chooseDevice).
-Device chooseDevice(const char* wanted);
+/// Threads of a block and the pixels that it covers, as in cuda_dialect.h.
+constexpr std::uint32_t kBlock = 128, kBlockWidth = 16, kBlockHeight = 8;
 
-/// The device's primary context, held open. All CUDA calls of an integrator are made while it is current.
-class Context {
+/// A GPU opened for work: its primary context, memory, launches.
+class CudaDevice final : public gpu::GpuDevice {
 public:
-    explicit Context(const Device& device);
-    ~Context();
-    Context(const Context&) = delete;
-    Context& operator=(const Context&) = delete;
+    CudaDevice(const plugin::Host& host, const CrtCreateInfo& info);
 
-    /// Makes it the calling thread's: at the start of every verb, since the owner thread may be another one
-    /// each time.
-    void makeCurrent() const;
-    /// The same for a destructor: when it fails the device is lost, and there is nothing to give back.
-    void tryMakeCurrent() const noexcept { driver().cuCtxSetCurrent(context_); }
+    void makeCurrent() const override;
+    std::unique_ptr<gpu::GpuProgram> makeProgram(const plugin::Host& host, const gpu::Specs& wanted,
+                                                 CrtKernelChoice choice) override;
+    std::uint64_t freeBytes() const override;
+    void fill(const GpuBuffer& to, unsigned char value, std::uint64_t first,
+              std::uint64_t bytes) const override;
+    void write(const GpuBuffer& to, const void* from) const override;
+    void read(const GpuBuffer& from, void* to, std::uint64_t first, std::uint64_t bytes) const override;
+    void launch(void* entry, const char* name, const gpu::GpuGrid& grid,
+                const gpu::GpuArguments& arguments) override;
+    double seconds(const std::function<void()>& start) override;
 
 private:
-    CUdevice device_;
-    CUcontext context_ = nullptr;
+    std::shared_ptr<void> take(std::uint64_t bytes) override;
+
+    std::jthread opening_compiler_;  ///< While the device is opened.
+    Device device_;
+    std::shared_ptr<CUctx_st> context_;
+    std::shared_ptr<CUevent_st> start_, end_;
+    std::vector<void*> pointers_;  ///< To a launch's arguments.
 };
-
-/// Throws PluginError(CRT_OUT_OF_MEMORY), with the numbers, where the current device has less than `bytes`
-/// free. A larger amount of free memory is no promise: memory is shared with other programs.
-void requireFree(std::uint64_t bytes, const Device& device, const char* what);
-
-/// Plain device memory.
-class Memory {
-public:
-    Memory() = default;
-    Memory(std::uint64_t bytes, const Device& device, const char* what);
-    Memory(Memory&& other) noexcept
-        : address_(std::exchange(other.address_, 0)), bytes_(std::exchange(other.bytes_, 0)) {}
-    Memory& operator=(Memory&& other) noexcept {
-        std::swap(address_, other.address_);
-        std::swap(bytes_, other.bytes_);
-        return *this;
-    }
-    ~Memory();
-
-    CUdeviceptr address() const { return address_; }
-    std::uint64_t bytes() const { return bytes_; }
-
-    void fill(unsigned char value) const;
-    void upload(const void* from) const;
-    void download(void* to) const;
-
-private:
-    CUdeviceptr address_ = 0;
-    std::uint64_t bytes_ = 0;
-};
-
-/// "12.3 MB".
-std::string megabytes(std::uint64_t bytes);
 
 }  // namespace crt::cuda

@@ -1,6 +1,6 @@
 #include "cuda_lean_kernel.h"
 
-#include "cuda_kernel_text.h"
+#include "cuda_dialect_text.h"
 
 #include "kernel/dialect/features.h"
 
@@ -32,7 +32,7 @@ bool traverses(const KernelSpec& spec) {
 }
 
 std::string kernelText(const std::string& wavefront_text) {
-    return wavefront_text + "\n#line 1 \"kernels.cu\"\n" + kKernelText;
+    return gpu::kernelText(wavefront_text, "cuda_dialect.h", kDialectText);
 }
 
 std::vector<int> blocksPerMultiprocessor(const KernelSpec& spec) {

@@ -4,7 +4,7 @@
 #include "cuda_nvrtc.h"
 
 #include "backend/sdk/kernel_cache.h"
-#include "common/kernel_spec.h"
+#include "gpu/gpu_program.h"
 
 #include <cstdint>
 #include <string>
@@ -12,13 +12,13 @@
 
 namespace crt::cuda {
 
-using plugin::Entry;
-using plugin::KernelSpec;
+using gpu::Entry;
+using gpu::KernelSpec;
 
 /// True if it has the stacks of a tree's traversal.
 bool traverses(const KernelSpec& spec);
 
-/// The whole text that NVRTC compiles: the host's text of kernel/schedule/wavefront.h, then kernels.cu.
+/// The whole text that NVRTC compiles.
 std::string kernelText(const std::string& wavefront_text);
 
 /// Numbers of blocks that a multiprocessor should hold at once, in the order of trying: more hide latency

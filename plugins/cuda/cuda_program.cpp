@@ -18,74 +18,52 @@ using plugin::KernelCache;
 
 namespace {
 
-class Stopwatch {
-public:
-    double seconds() const {
-        return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
-    }
-
-private:
-    std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-};
-
 /// One for the process; a throw leaves it unset. [any thread]
 const Nvrtc& nvrtc() {
     static const Nvrtc found = Nvrtc::open(nvrtcCandidates(std::getenv("CUDA_HOME")));
     return found;
 }
 
-}  // namespace
-
-Module::Module(const void* image, const KernelSpec& spec, std::string name)
-    : spec_(spec), name_(std::move(name)) {
+/// `image`: a CUBIN or a fat binary. `name`: for messages.
+GpuKernel loadKernel(const void* image, const KernelSpec& spec, const std::string& name,
+                     const Device& device) {
     const Driver& cuda = driver();
-    cuda.check(cuda.cuModuleLoadData(&module_, image), "loading the " + name_ + " kernel");
-    try {
-        const std::string entry = entryName(spec_.entry);
-        cuda.check(cuda.cuModuleGetFunction(&kernel_, module_, entry.c_str()),
+    CUmodule module = nullptr;
+    cuda.check(cuda.cuModuleLoadData(&module, image), "loading the " + name + " kernel");
+    GpuKernel kernel;
+    kernel.module = {static_cast<void*>(module),
+                     [](void* loaded) { driver().cuModuleUnload(static_cast<CUmodule>(loaded)); }};
+    kernel.spec = spec;
+    const auto take = [&](const std::string& entry) {
+        CUfunction function = nullptr;
+        cuda.check(cuda.cuModuleGetFunction(&function, module, entry.c_str()),
                    "taking " + entry + " from the module");
-        if (spec_.entry == Entry::Render || spec_.entry == Entry::Trace)
-            cuda.check(cuda.cuModuleGetFunction(&add_slices_, module_, "crt_add_slices"),
-                       "taking crt_add_slices from the module");
-        // No kernel uses shared memory: all of it may cache the scene.
-        cuda.check(cuda.cuFuncSetCacheConfig(kernel_, CU_FUNC_CACHE_PREFER_L1), "preferring the L1 cache");
+        return function;
+    };
+    CUfunction const entry = take(entryName(spec.entry));
+    kernel.entry = entry;
+    if (spec.entry == Entry::Render || spec.entry == Entry::Trace)
+        kernel.add_slices = take("crt_add_slices");
+    // No kernel uses shared memory: all of it may cache the scene.
+    cuda.check(cuda.cuFuncSetCacheConfig(entry, CU_FUNC_CACHE_PREFER_L1), "preferring the L1 cache");
 
-        int registers = 0, local_bytes = 0, blocks = 0;
-        cuda.check(cuda.cuFuncGetAttribute(&registers, CU_FUNC_ATTRIBUTE_NUM_REGS, kernel_),
-                   "querying registers");
-        cuda.check(cuda.cuFuncGetAttribute(&local_bytes, CU_FUNC_ATTRIBUTE_LOCAL_SIZE_BYTES, kernel_),
-                   "querying local memory");
-        cuda.check(cuda.cuOccupancyMaxActiveBlocksPerMultiprocessor(&blocks, kernel_, kBlock, 0),
-                   "querying the occupancy");
-        // Local memory is the stacks of both traversals of the BVH, which are meant to be there, and what
-        // did not fit into registers.
-        constexpr int kTraversalStack = CRT_BVH_STACK * (sizeof(kernel::u64) + sizeof(kernel::u32));
-
-        registers_ = static_cast<std::uint32_t>(registers);
-        spill_bytes_ =
-            static_cast<std::uint32_t>(std::max(0, local_bytes - (traverses(spec_) ? kTraversalStack : 0)));
-        resident_blocks_ = static_cast<std::uint32_t>(std::max(blocks, 1));
-    } catch (...) {
-        cuda.cuModuleUnload(module_);
-        throw;
-    }
+    int registers = 0, local_bytes = 0, blocks = 0;
+    cuda.check(cuda.cuFuncGetAttribute(&registers, CU_FUNC_ATTRIBUTE_NUM_REGS, entry), "querying registers");
+    cuda.check(cuda.cuFuncGetAttribute(&local_bytes, CU_FUNC_ATTRIBUTE_LOCAL_SIZE_BYTES, entry),
+               "querying local memory");
+    cuda.check(cuda.cuOccupancyMaxActiveBlocksPerMultiprocessor(&blocks, entry, kBlock, 0),
+               "querying the occupancy");
+    // Local memory is the stacks of both traversals of the BVH, which are meant to be there, and what did
+    // not fit into registers.
+    constexpr int kTraversalStack = CRT_BVH_STACK * (sizeof(kernel::u64) + sizeof(kernel::u32));
+    kernel.registers = static_cast<std::uint32_t>(registers);
+    kernel.spill_bytes =
+        static_cast<std::uint32_t>(std::max(0, local_bytes - (traverses(spec) ? kTraversalStack : 0)));
+    kernel.resident_blocks = static_cast<std::uint64_t>(std::max(blocks, 1)) * device.multiprocessors;
+    return kernel;
 }
 
-Module& Module::operator=(Module&& other) noexcept {
-    std::swap(module_, other.module_);
-    std::swap(kernel_, other.kernel_);
-    std::swap(add_slices_, other.add_slices_);
-    std::swap(spec_, other.spec_);
-    std::swap(registers_, other.registers_);
-    std::swap(spill_bytes_, other.spill_bytes_);
-    std::swap(resident_blocks_, other.resident_blocks_);
-    std::swap(name_, other.name_);
-    return *this;
-}
-
-Module::~Module() {
-    if (module_ != nullptr) driver().cuModuleUnload(module_);
-}
+}  // namespace
 
 void openCompiler() noexcept {
     try {
@@ -95,9 +73,9 @@ void openCompiler() noexcept {
     }
 }
 
-CudaProgram::CudaProgram(const plugin::Host& host, const Device& device, std::vector<KernelSpec> wanted,
+CudaProgram::CudaProgram(const plugin::Host& host, const Device& device, const gpu::Specs& wanted,
                          CrtKernelChoice choice)
-    : host_(host), wanted_(std::move(wanted)) {
+    : GpuProgram(wanted), host_(host), device_(device) {
     if (choice == CRT_KERNEL_FULL) {
         loadPrecompiled();
         return;
@@ -122,7 +100,7 @@ CudaProgram::CudaProgram(const plugin::Host& host, const Device& device, std::ve
 
     lean_name_ = compiler->name() + " sm_" + std::to_string(device.arch);
     const std::string text = kernelText(host_.kernelSource("kernel/schedule/wavefront.h"));
-    takeFromCache(text, *compiler, device);
+    takeFromCache(text, *compiler);
     if (pending_.empty()) {
         from_cache_ = true;
         return;
@@ -144,16 +122,16 @@ CudaProgram::CudaProgram(const plugin::Host& host, const Device& device, std::ve
 
 void CudaProgram::loadPrecompiled() {
     if (precompiled_.empty())
-        precompiled_.emplace_back(kPrecompiledKernels, KernelSpec{Entry::Render, CRT_FEATURES_ALL},
-                                  "precompiled");
+        precompiled_.push_back(
+            loadKernel(kPrecompiledKernels, {Entry::Render, CRT_FEATURES_ALL}, "precompiled", device_));
 }
 
-void CudaProgram::takeFromCache(const std::string& text, const Nvrtc& compiler, const Device& device) {
-    const Stopwatch cache_time;
+void CudaProgram::takeFromCache(const std::string& text, const Nvrtc& compiler) {
+    const gpu::Stopwatch cache_time;
     const KernelCache cache(host_.cacheDirectory());
     lean_.resize(wanted_.size());
     for (std::size_t i = 0; i < wanted_.size(); ++i) {
-        Pending kernel{i, cacheKey(text, device.arch, wanted_[i], compiler.name(), driver().version),
+        Pending kernel{i, cacheKey(text, device_.arch, wanted_[i], compiler.name(), driver().version),
                        nullptr};
         std::string refused;
         const std::optional<std::vector<unsigned char>> cubin = cache.load(kernel.key, &refused);
@@ -161,7 +139,7 @@ void CudaProgram::takeFromCache(const std::string& text, const Nvrtc& compiler, 
             host_.log(CRT_LOG_WARNING, "cuda: a cached kernel is refused, and compiled again: " + refused);
         if (cubin) {
             try {
-                lean_[i] = Module(cubin->data(), wanted_[i], lean_name_);
+                lean_[i] = loadKernel(cubin->data(), wanted_[i], lean_name_, device_);
                 continue;
             } catch (const plugin::PluginError& error) {
                 host_.log(
@@ -197,7 +175,7 @@ void CudaProgram::poll() {
         pending_.erase(pending_.begin() + static_cast<std::ptrdiff_t>(i));
         compile_seconds_ += compiled->compile_seconds;
         cache_seconds_ += compiled->cache_seconds;
-        lean_[index] = Module(compiled->cubin.data(), wanted_[index], lean_name_);
+        lean_[index] = loadKernel(compiled->cubin.data(), wanted_[index], lean_name_, device_);
     }
     startCompilers();
 }
@@ -209,22 +187,26 @@ void CudaProgram::giveUp(const std::string& why) {
     loadPrecompiled();
 }
 
-const std::vector<Module>& CudaProgram::current() {
+void CudaProgram::giveUpWaves(const std::string& why) {
+    giveUp("continuing with the precompiled kernel: " + why);
+}
+
+const std::vector<GpuKernel>& CudaProgram::current() {
     if (!pending_.empty()) {
         try {
             poll();
         } catch (const std::exception& error) {
-            giveUp(std::string("continuing with the precompiled kernel: ") + error.what());
+            giveUpWaves(error.what());
         }
     }
     return lean_.empty() || !pending_.empty() ? precompiled_ : lean_;
 }
 
 std::string CudaProgram::description() const {
-    if (lean_.empty() || !pending_.empty()) return precompiled_.front().name();
+    if (lean_.empty() || !pending_.empty()) return "precompiled";
     const std::string lean =
         lean_name_ + (lean_.size() > 1 ? ", " + std::to_string(lean_.size()) + " kernels" : std::string());
-    return precompiled_.empty() ? lean : precompiled_.front().name() + ", then " + lean;
+    return precompiled_.empty() ? lean : "precompiled, then " + lean;
 }
 
 }  // namespace crt::cuda

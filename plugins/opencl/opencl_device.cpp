@@ -1,11 +1,16 @@
 #include "opencl_device.h"
 
 #include "opencl_caches.h"
+#include "opencl_program.h"
 
+#include "backend/sdk/gpu_schedule.h"
+#include "backend/sdk/launch_pacer.h"
 #include "backend/sdk/plugin_guard.h"
+#include "gpu/device_list.h"
 
 #include <algorithm>
 #include <cctype>
+#include <cstdlib>
 #include <map>
 #include <mutex>
 
@@ -35,19 +40,13 @@ T deviceInfo(cl_device_id device, cl_device_info what) {
     return value;
 }
 
-std::string deviceText(cl_device_id device, cl_device_info what) {
+/// `query`: clGetDeviceInfo, clGetPlatformInfo.
+template <class Query, class Object>
+std::string infoText(Query query, Object object, cl_uint what) {
     std::size_t size = 0;
-    if (clGetDeviceInfo(device, what, 0, nullptr, &size) != CL_SUCCESS) return {};
+    if (query(object, what, 0, nullptr, &size) != CL_SUCCESS) return {};
     std::string text(size, '\0');
-    if (clGetDeviceInfo(device, what, size, text.data(), nullptr) != CL_SUCCESS) return {};
-    return trimmed(text);
-}
-
-std::string platformText(cl_platform_id platform, cl_platform_info what) {
-    std::size_t size = 0;
-    if (clGetPlatformInfo(platform, what, 0, nullptr, &size) != CL_SUCCESS) return {};
-    std::string text(size, '\0');
-    if (clGetPlatformInfo(platform, what, size, text.data(), nullptr) != CL_SUCCESS) return {};
+    if (query(object, what, size, text.data(), nullptr) != CL_SUCCESS) return {};
     return trimmed(text);
 }
 
@@ -70,8 +69,9 @@ Device describe(cl_platform_id platform, cl_device_id id, std::uint32_t index) {
     Device device;
     device.id = id;
     device.index = index;
-    device.name = deviceText(id, CL_DEVICE_NAME);
-    device.driver = deviceText(id, CL_DRIVER_VERSION) + ", " + platformText(platform, CL_PLATFORM_VERSION);
+    device.name = infoText(clGetDeviceInfo, id, CL_DEVICE_NAME);
+    device.driver = infoText(clGetDeviceInfo, id, CL_DRIVER_VERSION) + ", " +
+                    infoText(clGetPlatformInfo, platform, CL_PLATFORM_VERSION);
     device.is_cpu = (deviceInfo<cl_device_type>(id, CL_DEVICE_TYPE) & CL_DEVICE_TYPE_CPU) != 0;
     device.has_correct_division_option = (deviceInfo<cl_device_fp_config>(id, CL_DEVICE_SINGLE_FP_CONFIG) &
                                           CL_FP_CORRECTLY_ROUNDED_DIVIDE_SQRT) != 0;
@@ -83,71 +83,29 @@ Device describe(cl_platform_id platform, cl_device_id id, std::uint32_t index) {
     return device;
 }
 
-/// "0 'name' has no compiler, …" for each that cannot be used.
-std::string listUnusable(const std::vector<Device>& devices) {
-    std::string list;
-    for (const Device& device : devices)
-        if (!device.unusable.empty())
-            list += (list.empty() ? "" : ", ") + std::to_string(device.index) + " '" + device.name + "' " +
-                    device.unusable;
-    return list;
-}
-
 }  // namespace
 
+// Errors of OpenCL 1.2, without CL_; those of images are left out.
+#define CRT_CL_ERRORS(F) \
+    F(SUCCESS) F(DEVICE_NOT_FOUND) F(DEVICE_NOT_AVAILABLE) F(COMPILER_NOT_AVAILABLE)                  \
+    F(MEM_OBJECT_ALLOCATION_FAILURE) F(OUT_OF_RESOURCES) F(OUT_OF_HOST_MEMORY)                        \
+    F(PROFILING_INFO_NOT_AVAILABLE) F(BUILD_PROGRAM_FAILURE) F(MISALIGNED_SUB_BUFFER_OFFSET)          \
+    F(EXEC_STATUS_ERROR_FOR_EVENTS_IN_WAIT_LIST) F(COMPILE_PROGRAM_FAILURE) F(LINKER_NOT_AVAILABLE)   \
+    F(LINK_PROGRAM_FAILURE) F(DEVICE_PARTITION_FAILED) F(KERNEL_ARG_INFO_NOT_AVAILABLE)               \
+    F(INVALID_VALUE) F(INVALID_DEVICE_TYPE) F(INVALID_PLATFORM) F(INVALID_DEVICE) F(INVALID_CONTEXT)  \
+    F(INVALID_QUEUE_PROPERTIES) F(INVALID_COMMAND_QUEUE) F(INVALID_HOST_PTR) F(INVALID_MEM_OBJECT)    \
+    F(INVALID_BINARY) F(INVALID_BUILD_OPTIONS) F(INVALID_PROGRAM) F(INVALID_PROGRAM_EXECUTABLE)       \
+    F(INVALID_KERNEL_NAME) F(INVALID_KERNEL_DEFINITION) F(INVALID_KERNEL) F(INVALID_ARG_INDEX)        \
+    F(INVALID_ARG_VALUE) F(INVALID_ARG_SIZE) F(INVALID_KERNEL_ARGS) F(INVALID_WORK_DIMENSION)         \
+    F(INVALID_WORK_GROUP_SIZE) F(INVALID_WORK_ITEM_SIZE) F(INVALID_GLOBAL_OFFSET)                     \
+    F(INVALID_EVENT_WAIT_LIST) F(INVALID_EVENT) F(INVALID_OPERATION) F(INVALID_BUFFER_SIZE)           \
+    F(INVALID_GLOBAL_WORK_SIZE) F(INVALID_PROPERTY) F(INVALID_COMPILER_OPTIONS)                       \
+    F(INVALID_LINKER_OPTIONS) F(INVALID_DEVICE_PARTITION_COUNT)
+
 std::string errorName(cl_int error) {
-#define CRT_CL_ERROR(name) \
-    case name: return #name
+#define CRT_CL_ERROR(name) case CL_##name: return "CL_" #name;
     switch (error) {
-        CRT_CL_ERROR(CL_SUCCESS);
-        CRT_CL_ERROR(CL_DEVICE_NOT_FOUND);
-        CRT_CL_ERROR(CL_DEVICE_NOT_AVAILABLE);
-        CRT_CL_ERROR(CL_COMPILER_NOT_AVAILABLE);
-        CRT_CL_ERROR(CL_MEM_OBJECT_ALLOCATION_FAILURE);
-        CRT_CL_ERROR(CL_OUT_OF_RESOURCES);
-        CRT_CL_ERROR(CL_OUT_OF_HOST_MEMORY);
-        CRT_CL_ERROR(CL_PROFILING_INFO_NOT_AVAILABLE);
-        CRT_CL_ERROR(CL_BUILD_PROGRAM_FAILURE);
-        CRT_CL_ERROR(CL_MISALIGNED_SUB_BUFFER_OFFSET);
-        CRT_CL_ERROR(CL_EXEC_STATUS_ERROR_FOR_EVENTS_IN_WAIT_LIST);
-        CRT_CL_ERROR(CL_COMPILE_PROGRAM_FAILURE);
-        CRT_CL_ERROR(CL_LINKER_NOT_AVAILABLE);
-        CRT_CL_ERROR(CL_LINK_PROGRAM_FAILURE);
-        CRT_CL_ERROR(CL_DEVICE_PARTITION_FAILED);
-        CRT_CL_ERROR(CL_KERNEL_ARG_INFO_NOT_AVAILABLE);
-        CRT_CL_ERROR(CL_INVALID_VALUE);
-        CRT_CL_ERROR(CL_INVALID_DEVICE_TYPE);
-        CRT_CL_ERROR(CL_INVALID_PLATFORM);
-        CRT_CL_ERROR(CL_INVALID_DEVICE);
-        CRT_CL_ERROR(CL_INVALID_CONTEXT);
-        CRT_CL_ERROR(CL_INVALID_QUEUE_PROPERTIES);
-        CRT_CL_ERROR(CL_INVALID_COMMAND_QUEUE);
-        CRT_CL_ERROR(CL_INVALID_HOST_PTR);
-        CRT_CL_ERROR(CL_INVALID_MEM_OBJECT);
-        CRT_CL_ERROR(CL_INVALID_BINARY);
-        CRT_CL_ERROR(CL_INVALID_BUILD_OPTIONS);
-        CRT_CL_ERROR(CL_INVALID_PROGRAM);
-        CRT_CL_ERROR(CL_INVALID_PROGRAM_EXECUTABLE);
-        CRT_CL_ERROR(CL_INVALID_KERNEL_NAME);
-        CRT_CL_ERROR(CL_INVALID_KERNEL_DEFINITION);
-        CRT_CL_ERROR(CL_INVALID_KERNEL);
-        CRT_CL_ERROR(CL_INVALID_ARG_INDEX);
-        CRT_CL_ERROR(CL_INVALID_ARG_VALUE);
-        CRT_CL_ERROR(CL_INVALID_ARG_SIZE);
-        CRT_CL_ERROR(CL_INVALID_KERNEL_ARGS);
-        CRT_CL_ERROR(CL_INVALID_WORK_DIMENSION);
-        CRT_CL_ERROR(CL_INVALID_WORK_GROUP_SIZE);
-        CRT_CL_ERROR(CL_INVALID_WORK_ITEM_SIZE);
-        CRT_CL_ERROR(CL_INVALID_GLOBAL_OFFSET);
-        CRT_CL_ERROR(CL_INVALID_EVENT_WAIT_LIST);
-        CRT_CL_ERROR(CL_INVALID_EVENT);
-        CRT_CL_ERROR(CL_INVALID_OPERATION);
-        CRT_CL_ERROR(CL_INVALID_BUFFER_SIZE);
-        CRT_CL_ERROR(CL_INVALID_GLOBAL_WORK_SIZE);
-        CRT_CL_ERROR(CL_INVALID_PROPERTY);
-        CRT_CL_ERROR(CL_INVALID_COMPILER_OPTIONS);
-        CRT_CL_ERROR(CL_INVALID_LINKER_OPTIONS);
-        CRT_CL_ERROR(CL_INVALID_DEVICE_PARTITION_COUNT);
+        CRT_CL_ERRORS(CRT_CL_ERROR)
         case kPlatformNotFound: return "CL_PLATFORM_NOT_FOUND_KHR";
         default: return "OpenCL error " + std::to_string(error);
     }
@@ -169,6 +127,11 @@ double Device::score() const {
 
 CrtDevice Device::describe() const { return plugin::makeDevice(index, name, driver, memory_bytes, score()); }
 
+namespace {
+
+constexpr char kNoneUsable[] = "no OpenCL device can be used";
+
+/// Every device of every platform, the unusable too. Throws when there is not one.
 std::vector<Device> listDevices() {
     keepKernelsFromOthers();
     cl_uint platform_count = 0;
@@ -191,8 +154,8 @@ std::vector<Device> listDevices() {
             ids.resize(count);
         if (ids.empty() ||
             clGetDeviceIDs(platform, CL_DEVICE_TYPE_ALL, count, ids.data(), nullptr) != CL_SUCCESS) {
-            empty_platforms +=
-                (empty_platforms.empty() ? "'" : ", '") + platformText(platform, CL_PLATFORM_NAME) + "'";
+            empty_platforms += (empty_platforms.empty() ? "'" : ", '") +
+                               infoText(clGetPlatformInfo, platform, CL_PLATFORM_NAME) + "'";
             continue;
         }
         for (cl_device_id id : ids)
@@ -203,29 +166,9 @@ std::vector<Device> listDevices() {
     return devices;
 }
 
-std::vector<Device> usableDevices() {
-    const std::vector<Device> devices = listDevices();
-    std::vector<Device> usable;
-    for (const Device& device : devices)
-        if (device.unusable.empty()) usable.push_back(device);
-    if (usable.empty())
-        throw PluginError(CRT_NO_DEVICE, "no OpenCL device can be used: " + listUnusable(devices));
-    return usable;
-}
+}  // namespace
 
-Device chooseDevice(const char* wanted) {
-    const std::vector<Device> usable = usableDevices();
-    std::vector<CrtDevice> described;
-    for (const Device& device : usable) described.push_back(device.describe());
-    try {
-        const CrtDevice& chosen = plugin::chooseDevice(described, wanted);
-        return usable[static_cast<std::size_t>(&chosen - described.data())];
-    } catch (const PluginError& error) {
-        const std::string others = listUnusable(listDevices());
-        if (others.empty()) throw;
-        throw PluginError(error.status(), error.what() + ("; not usable: " + others));
-    }
-}
+std::vector<Device> usableDevices() { return gpu::usable(listDevices(), kNoneUsable); }
 
 const Session& openSession(const Device& device, std::uint32_t threads) {
     const bool divided = device.is_cpu && threads != 0 && threads < device.compute_units;
@@ -257,6 +200,111 @@ const Session& openSession(const Device& device, std::uint32_t threads) {
         clCreateCommandQueue(session.context.get(), session.target, CL_QUEUE_PROFILING_ENABLE, &result));
     check(result, "creating a command queue on '" + device.name + "'");
     return sessions.emplace(std::pair(device.id, compute_units), std::move(session)).first->second;
+}
+
+namespace {
+
+cl_mem memoryOf(const GpuBuffer& buffer) { return static_cast<cl_mem>(buffer.handle); }
+
+}  // namespace
+
+OpenClDevice::OpenClDevice(const plugin::Host& host, const CrtCreateInfo& info)
+    : device_(gpu::choose(listDevices(), kNoneUsable, info.device)),
+      session_(openSession(device_, info.threads)) {
+    if (info.threads != 0 && !device_.is_cpu)
+        host.log(CRT_LOG_DEBUG,
+                 "opencl: '" + device_.name + "' is not a CPU: the number of threads does not apply");
+    traits_.backend = "opencl";
+    traits_.name = device_.name;
+    traits_.memory_bytes = device_.memory_bytes;
+    traits_.largest_buffer_bytes = device_.largest_buffer_bytes;
+    traits_.own_memory = !device_.is_cpu;
+    traits_.block_width = blockSide(device_);
+    traits_.block_height = blockSide(device_);
+    // Every device traces these first paths in far less than a second.
+    traits_.first_paths = device_.is_cpu ? 4096 : 65536;
+}
+
+std::unique_ptr<gpu::GpuProgram> OpenClDevice::makeProgram(const plugin::Host& host,
+                                                           const gpu::Specs& wanted,
+                                                           CrtKernelChoice choice) {
+    return std::make_unique<OpenClProgram>(host, device_, session_, wanted, choice);
+}
+
+bool OpenClDevice::takesWaves(std::uint32_t max_depth) const {
+    // Pointers of 8 bytes, as the host's CrtWave has them.
+    if (device_.address_bits != 64) return false;
+    const char* requested = std::getenv("CRT_OPENCL_WAVES");
+    return !device_.is_cpu || mayOutlastLaunch(max_depth) ||
+           (requested != nullptr && std::string(requested) == "1");
+}
+
+std::uint64_t OpenClDevice::freeBytes() const {
+    return device_.memory_bytes - std::min(device_.memory_bytes, allocated_bytes_);
+}
+
+std::shared_ptr<void> OpenClDevice::take(std::uint64_t bytes) {
+    if (bytes > freeBytes()) return nullptr;
+    cl_int result = CL_SUCCESS;
+    const cl_mem memory = clCreateBuffer(session_.context.get(), CL_MEM_READ_WRITE, bytes, nullptr, &result);
+    check(result, "allocating " + std::to_string(bytes) + " bytes on '" + device_.name + "'");
+    allocated_bytes_ += bytes;
+    return {static_cast<void*>(memory), [this, memory, bytes](void*) {
+                clReleaseMemObject(memory);
+                allocated_bytes_ -= bytes;
+            }};
+}
+
+void OpenClDevice::fill(const GpuBuffer& to, unsigned char value, std::uint64_t first,
+                        std::uint64_t bytes) const {
+    const cl_uint pattern = 0x01010101u * value;
+    check(clEnqueueFillBuffer(session_.queue.get(), memoryOf(to), &pattern, sizeof pattern, first, bytes, 0,
+                              nullptr, nullptr),
+          "clearing device memory");
+}
+
+void OpenClDevice::write(const GpuBuffer& to, const void* from) const {
+    check(clEnqueueWriteBuffer(session_.queue.get(), memoryOf(to), CL_TRUE, 0, to.bytes, from, 0, nullptr,
+                               nullptr),
+          "uploading");
+}
+
+void OpenClDevice::read(const GpuBuffer& from, void* to, std::uint64_t first, std::uint64_t bytes) const {
+    check(clEnqueueReadBuffer(session_.queue.get(), memoryOf(from), CL_TRUE, first, bytes, to, 0, nullptr,
+                              nullptr),
+          "reading from '" + device_.name + "'");
+}
+
+void OpenClDevice::launch(void* entry, const char* name, const gpu::GpuGrid& grid,
+                          const gpu::GpuArguments& arguments) {
+    const auto kernel = static_cast<cl_kernel>(entry);
+    for (cl_uint i = 0; i < arguments.size(); ++i) {
+        const cl_int result = clSetKernelArg(kernel, i, arguments[i].bytes, arguments[i].value);
+        if (result != CL_SUCCESS) check(result, "setting argument " + std::to_string(i) + " of " + name);
+    }
+    const std::size_t local[2] = {grid.threads, 1}, global[2] = {grid.blocks * grid.threads, grid.rows};
+    cl_event event = nullptr;
+    const cl_int result = clEnqueueNDRangeKernel(session_.queue.get(), kernel, 2, nullptr, global, local, 0,
+                                                 nullptr, launches_ == 0 ? &event : nullptr);
+    if (result != CL_SUCCESS) check(result, std::string("launching ") + name);
+    if (launches_++ == 0) first_launch_ = Event(event);
+}
+
+double OpenClDevice::seconds(const std::function<void()>& start) {
+    launches_ = 0;
+    const gpu::Stopwatch waiting;
+    start();
+    const cl_event event = first_launch_.get();
+    check(launches_ == 1 ? clWaitForEvents(1, &event) : clFinish(session_.queue.get()),
+          "rendering on '" + device_.name + "'");
+    const double waited = waiting.seconds();
+    if (launches_ != 1) return waited;
+    cl_ulong began = 0, ended = 0;
+    check(clGetEventProfilingInfo(event, CL_PROFILING_COMMAND_START, sizeof began, &began, nullptr),
+          "reading the kernel's start");
+    check(clGetEventProfilingInfo(event, CL_PROFILING_COMMAND_END, sizeof ended, &ended, nullptr),
+          "reading the kernel's end");
+    return launchSeconds(began, ended, waited);
 }
 
 }  // namespace crt::opencl

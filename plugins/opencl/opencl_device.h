@@ -1,18 +1,23 @@
-/// OpenCL devices: listing, judging and choosing them, and the vocabulary every other file here uses
-/// (handles, checked calls).
+/// OpenCL devices: listing, judging, choosing and opening them, and the vocabulary every other file here
+/// uses (handles, checked calls).
 #pragma once
 
 #include "backend/crt_backend.h"
+#include "gpu/gpu_device.h"
 
 #define CL_TARGET_OPENCL_VERSION 120
 #include <CL/cl.h>
 
 #include <cstdint>
+#include <functional>
+#include <memory>
 #include <string>
-#include <utility>
+#include <type_traits>
 #include <vector>
 
 namespace crt::opencl {
+
+using gpu::GpuBuffer;
 
 /// "CL_BUILD_PROGRAM_FAILURE" for −11, and so on.
 std::string errorName(cl_int error);
@@ -22,29 +27,18 @@ std::string errorName(cl_int error);
 void check(cl_int result, const std::string& what);
 
 /// Owns one OpenCL object.
-template <class Object, cl_int (*Release)(Object)>
-class Handle {
-public:
-    Handle() = default;
-    explicit Handle(Object object) : object_(object) {}
-    Handle(Handle&& other) noexcept : object_(std::exchange(other.object_, nullptr)) {}
-    Handle& operator=(Handle&& other) noexcept {
-        std::swap(object_, other.object_);
-        return *this;
+template <auto Release>
+struct Releaser {
+    template <class Object>
+    void operator()(Object* object) const {
+        Release(object);
     }
-    ~Handle() {
-        if (object_ != nullptr) Release(object_);
-    }
-    Object get() const { return object_; }
-    explicit operator bool() const { return object_ != nullptr; }
-
-private:
-    Object object_ = nullptr;
 };
+template <class Object, auto Release>
+using Handle = std::unique_ptr<std::remove_pointer_t<Object>, Releaser<Release>>;
 
 using Context = Handle<cl_context, clReleaseContext>;
 using Queue = Handle<cl_command_queue, clReleaseCommandQueue>;
-using Buffer = Handle<cl_mem, clReleaseMemObject>;
 using Event = Handle<cl_event, clReleaseEvent>;
 using ProgramHandle = Handle<cl_program, clReleaseProgram>;
 using Kernel = Handle<cl_kernel, clReleaseKernel>;
@@ -68,15 +62,9 @@ struct Device {
     CrtDevice describe() const;
 };
 
-/// Every device of every platform, the unusable too. Throws when there is not one.
-std::vector<Device> listDevices();
-
-/// Those that can be used. Throws PluginError(CRT_NO_DEVICE) that says of each why not when there is none.
+/// The devices that can be used. Throws PluginError(CRT_NO_DEVICE) that says of each why not when there is
+/// none.
 std::vector<Device> usableDevices();
-
-/// The device that --device means (crt::plugin::chooseDevice). Throws when there is none, and then also says
-/// what is wrong with the others.
-Device chooseDevice(const char* wanted);
 
 /// A device, or some of a CPU's compute units, opened for work.
 struct Session {
@@ -92,5 +80,35 @@ struct Session {
 /// workers (3.1) look at the queue and the device of a command for a moment after they have reported it
 /// complete, and crash when those are gone. [any thread]
 const Session& openSession(const Device& device, std::uint32_t threads);
+
+/// A device opened for work: memory and launches.
+class OpenClDevice final : public gpu::GpuDevice {
+public:
+    OpenClDevice(const plugin::Host& host, const CrtCreateInfo& info);
+
+    std::unique_ptr<gpu::GpuProgram> makeProgram(const plugin::Host& host, const gpu::Specs& wanted,
+                                                 CrtKernelChoice choice) override;
+    /// On GPUs. On a processor the lanes do not wait for each other, and waves cost a fifth to a third
+    /// (docs/decisions/0044-waves-for-opencl.md); with CRT_OPENCL_WAVES=1 in the environment it takes them
+    /// too, so that tests and measurements can. Everywhere, where a path may outlast a launch.
+    bool takesWaves(std::uint32_t max_depth) const override;
+    std::uint64_t freeBytes() const override;
+    void fill(const GpuBuffer& to, unsigned char value, std::uint64_t first,
+              std::uint64_t bytes) const override;
+    void write(const GpuBuffer& to, const void* from) const override;
+    void read(const GpuBuffer& from, void* to, std::uint64_t first, std::uint64_t bytes) const override;
+    void launch(void* entry, const char* name, const gpu::GpuGrid& grid,
+                const gpu::GpuArguments& arguments) override;
+    double seconds(const std::function<void()>& start) override;
+
+private:
+    std::shared_ptr<void> take(std::uint64_t bytes) override;
+
+    Device device_;
+    const Session& session_;
+    std::uint64_t allocated_bytes_ = 0;
+    Event first_launch_;          ///< Since seconds() was called.
+    std::uint32_t launches_ = 0;  ///< The same.
+};
 
 }  // namespace crt::opencl

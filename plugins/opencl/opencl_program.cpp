@@ -1,13 +1,15 @@
 #include "opencl_program.h"
 
-#include "opencl_kernel_text.h"
+#include "opencl_dialect_text.h"
 
 #include "backend/sdk/kernel_cache.h"
 
-#include <chrono>
+#include <algorithm>
 #include <cstdio>
+#include <future>
+#include <memory>
 #include <optional>
-#include <vector>
+#include <utility>
 
 namespace crt::opencl {
 
@@ -15,16 +17,6 @@ using plugin::KernelCache;
 using plugin::PluginError;
 
 namespace {
-
-class Stopwatch {
-public:
-    double seconds() const {
-        return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
-    }
-
-private:
-    std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-};
 
 /// The output of the compiler, at most `line_count` lines of it.
 std::string buildLog(cl_program program, cl_device_id target, int line_count) {
@@ -84,34 +76,26 @@ ProgramHandle fromText(const Session& session, const Device& device, const std::
     return program;
 }
 
-}  // namespace
+/// Groups that shade a queue, a compute unit; they take turns where it is longer.
+constexpr std::uint64_t kGroupsPerUnit = 16;
 
-GroupSize groupSize(const Device& device) { return device.is_cpu ? GroupSize{1, 1} : GroupSize{8, 8}; }
+/// A built kernel and what it cost to get it.
+struct Built {
+    ProgramHandle program;
+    Kernel kernel;
+    bool from_cache = false;
+    double compile_seconds = 0, cache_seconds = 0;
+};
 
-std::string buildOptions(const Device& device, const plugin::KernelSpec& spec) {
-    const GroupSize group = groupSize(device);
-    char options[256];
-    std::snprintf(options, sizeof options,
-                  "-cl-std=CL1.2 -DCRT_ENTRIES=%u -DCRT_FEATURES=0x%llxul -DCRT_SIMD8=%d -DCRT_GROUP_X=%u "
-                  "-DCRT_GROUP_Y=%u",
-                  static_cast<unsigned>(spec.entry), static_cast<unsigned long long>(spec.features),
-                  device.is_cpu
-                      ? 1
-                      : 0,  // a GPU's lanes are its work-items: eight-wide vectors only cost it registers
-                  group.x, group.y);
-    return options +
-           std::string(device.has_correct_division_option ? " -cl-fp32-correctly-rounded-divide-sqrt" : "");
-}
-
-Program buildProgram(const plugin::Host& host, const Device& device, const Session& session,
-                     const plugin::KernelSpec& spec) {
-    Program built;
-    built.spec = spec;
+/// Compiles a kernel, or takes it from the host's cache.
+Built buildKernel(const plugin::Host& host, const Device& device, const Session& session,
+                  const gpu::KernelSpec& spec) {
+    Built built;
     const std::string options = buildOptions(device, spec);
-    const std::string text = std::string(host.kernelSource("kernel/schedule/wavefront.h")) +
-                             "\n#line 1 \"kernels.cl\"\n" + kKernelText;
+    const std::string text =
+        gpu::kernelText(host.kernelSource("kernel/schedule/wavefront.h"), "opencl_dialect.h", kDialectText);
 
-    Stopwatch cache_time;
+    const gpu::Stopwatch cache_time;
     const KernelCache cache(host.cacheDirectory());
     const KernelCache::Key key = KernelCache::makeKey({"opencl", text, options, device.name, device.driver});
     std::string refused;
@@ -127,23 +111,86 @@ Program buildProgram(const plugin::Host& host, const Device& device, const Sessi
     built.cache_seconds = cache_time.seconds();
 
     if (!built.program) {
-        const Stopwatch compile_time;
+        const gpu::Stopwatch compile_time;
         built.program = fromText(session, device, text, options);
         // PoCL generates the machine code only at the first launch, 0.7 s that none of crt's times include,
         // and keeps it in a separate cache.
         const std::vector<unsigned char> compiled = programBinary(built.program.get());
         built.compile_seconds = compile_time.seconds();
 
-        const Stopwatch store_time;
+        const gpu::Stopwatch store_time;
         if (!compiled.empty()) cache.store(key, compiled.data(), compiled.size());
         built.cache_seconds += store_time.seconds();
     }
 
     cl_int result = CL_SUCCESS;
-    const char* name = plugin::entryName(spec.entry);
+    const char* name = gpu::entryName(spec.entry);
     built.kernel = Kernel(clCreateKernel(built.program.get(), name, &result));
     check(result, std::string("taking ") + name + " from the compiled program");
     return built;
+}
+
+}  // namespace
+
+std::uint32_t blockSide(const Device& device) { return device.is_cpu ? 1 : 8; }
+
+std::string buildOptions(const Device& device, const gpu::KernelSpec& spec) {
+    // A GPU's lanes are its work-items: eight-wide vectors only cost it registers.
+    const int simd8 = device.is_cpu ? 1 : 0;
+    const unsigned side = blockSide(device);
+    char options[256];
+    std::snprintf(options, sizeof options,
+                  "-cl-std=CL1.2 -DCRT_ENTRIES=%u -DCRT_FEATURES=0x%llxul -DCRT_SIMD8=%d "
+                  "-DCRT_BLOCK_WIDTH=%uu -DCRT_BLOCK_HEIGHT=%uu",
+                  static_cast<unsigned>(spec.entry), static_cast<unsigned long long>(spec.features), simd8,
+                  side, side);
+    return options +
+           std::string(device.has_correct_division_option ? " -cl-fp32-correctly-rounded-divide-sqrt" : "");
+}
+
+OpenClProgram::OpenClProgram(const plugin::Host& host, const Device& device, const Session& session,
+                             const gpu::Specs& wanted, CrtKernelChoice choice)
+    : GpuProgram(wanted), host_(host), device_(device), session_(session), choice_(choice) {
+    build(wanted_);
+}
+
+void OpenClProgram::build(const gpu::Specs& specs) {
+    std::vector<std::future<Built>> building;
+    for (const gpu::KernelSpec& spec : specs)
+        building.push_back(std::async(specs.size() > 1 ? std::launch::async : std::launch::deferred,
+                                      [&] { return buildKernel(host_, device_, session_, spec); }));
+    std::vector<gpu::GpuKernel> kernels;
+    double compile_seconds = 0, cache_seconds = 0;
+    bool from_cache = true;
+    for (std::size_t i = 0; i < specs.size(); ++i) {
+        const auto built = std::make_shared<Built>(building[i].get());
+        compile_seconds = std::max(compile_seconds, built->compile_seconds);
+        cache_seconds = std::max(cache_seconds, built->cache_seconds);
+        from_cache = from_cache && built->from_cache;
+        gpu::GpuKernel kernel;
+        kernel.spec = specs[i];
+        kernel.module = built;
+        kernel.entry = built->kernel.get();
+        kernel.resident_blocks = kGroupsPerUnit * session_.compute_units;
+        kernels.push_back(std::move(kernel));
+    }
+    kernels_ = std::move(kernels);
+    from_cache_ = from_cache;
+    compile_seconds_ += compile_seconds;
+    cache_seconds_ += cache_seconds;
+}
+
+void OpenClProgram::giveUpWaves(const std::string& why) {
+    host_.log(CRT_LOG_DEBUG, "opencl: continuing without waves: " + why);
+    build({{gpu::Entry::Render, kernels_.front().spec.features}});
+}
+
+std::string OpenClProgram::description() const {
+    const bool waves = kernels_.front().spec.entry == gpu::Entry::Trace;
+    return std::string(choice_ == CRT_KERNEL_FULL ? "full" : "lean") +
+           (waves ? " kernels, paths sorted by material, " : " kernel, ") +
+           std::to_string(session_.compute_units) + " of " + std::to_string(device_.compute_units) +
+           " compute units";
 }
 
 }  // namespace crt::opencl

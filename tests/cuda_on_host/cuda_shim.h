@@ -1,5 +1,6 @@
-/// The few words of CUDA that plugins/cuda/kernels.cu uses, for a C++ compiler on a machine without a GPU.
-/// Include it before kernels.cu and after all other headers: NVRTC's own macro is defined here.
+/// The few words of CUDA that the entry points use (plugins/cuda/cuda_dialect.h), for a C++ compiler on a
+/// machine without a GPU. Include it before the kernel and after all other headers: NVRTC's own macro is
+/// defined here.
 ///
 /// This checks what the entry points compute: which pixels and samples each thread takes, and the sum of the
 /// slices. It says nothing about nvcc's arithmetic; that is for a machine with a GPU.

@@ -9,8 +9,11 @@
 
 #include "cuda_shim.h"
 
+#include "kernel/schedule/wavefront.h"
+
 #define CRT_ENTRIES 15  // all
-#include "../../plugins/cuda/kernels.cu"
+#include "../../plugins/cuda/cuda_dialect.h"
+#include "../../plugins/gpu/kernels.h"
 
 namespace crt::cuda_on_host {
 namespace {

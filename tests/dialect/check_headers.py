@@ -65,7 +65,7 @@ def main() -> int:
     suffix, options = LANGUAGES[language]
     rooms = check_rooms.read_rooms()
     headers = [(room, header) for room in rooms if room.startswith("kernel/")
-               for header in sorted((check_rooms.CORE / room).glob("*.h"))]
+               for header in sorted(rooms[room].path.glob("*.h"))]
     if not headers:
         print("core/kernel has no headers", file=sys.stderr)
         return 1

@@ -1,15 +1,16 @@
 #!/usr/bin/env python3
-"""The rooms of core/ and the arrows between them, as core/CMakeLists.txt says them.
+"""The rooms of core/ and plugins/ and the arrows between them, as their CMakeLists.txt say them.
 
     tests/rooms/check_rooms.py                  exit code 1 when something goes against the arrows
     tests/rooms/check_rooms.py --build DIR      also looks at the include roots of a build tree
     tests/rooms/check_rooms.py --draw           the picture of docs/architecture.md
     tests/rooms/check_rooms.py --write          puts that picture there
 
-The checks: only CMakeLists.txt and rooms lie directly in core/; every header lies in a room; every
-source file of a room is in its target; every include of another room's header follows the arrows; no target
-links a room outside crt_room(); an include root holds the headers of its own room alone;
-docs/architecture.md has the picture that --draw makes. """
+The checks: only CMakeLists.txt and rooms lie directly in core/ and plugins/, and in plugins/ the backends;
+every header lies in a room; every source file of a room is in its target; every include of another room's
+header follows the arrows; no backend includes files of another; no target links a room outside crt_room();
+an include root holds the headers of its own room alone; docs/architecture.md has the picture that --draw
+makes. """
 
 import argparse
 import pathlib
@@ -17,7 +18,7 @@ import re
 import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-CORE = ROOT / "core"
+ROOTS = {"core": ROOT / "core", "plugins": ROOT / "plugins"}
 PAGE = ROOT / "docs" / "architecture.md"
 BEGIN, END = "<!-- rooms: tests/rooms/check_rooms.py --write -->\n", "<!-- /rooms -->\n"
 KEYWORDS = ("SOURCES", "USES", "LIBRARIES", "HEADERS")
@@ -37,11 +38,13 @@ OTHER_TARGETS = {
 
 # Folders that are not rooms, and the room that they are linked to (libcrt).
 BESIDE = {"api": "render"}
+# Folders of plugins/ that are not rooms, and the room that they are linked to.
+BACKENDS = {"embree": "backend/sdk", "opencl": "gpu", "cuda": "gpu"}
 
 
 class Room:
-    def __init__(self, folder, comment, words):
-        self.folder, self.comment = folder, comment
+    def __init__(self, root, folder, comment, words):
+        self.root, self.folder, self.comment = root, folder, comment
         self.parts = {k: [] for k in KEYWORDS}
         part = None
         for word in words:
@@ -49,6 +52,14 @@ class Room:
                 part = self.parts[word]
             elif part is not None:
                 part.append(word)
+
+    @property
+    def path(self):
+        return ROOTS[self.root] / self.folder
+
+    @property
+    def name(self):
+        return self.folder if self.root == "core" else f"{self.root}/{self.folder}"
 
     @property
     def uses(self):
@@ -60,15 +71,15 @@ def target_of(folder):
     return "crt_" + folder.replace("/", "_")
 
 
-def read_rooms(text=None):
-    """Rooms in the order of the file, which is that of the data."""
-    if text is None:
-        text = (CORE / "CMakeLists.txt").read_text()
+def read_rooms():
+    """Rooms in the order of the files, which is that of the data."""
     rooms = {}
-    for match in re.finditer(r"((?:^# .*\n)*)^crt_room\(([^)]*)\)", text, re.MULTILINE):
-        comment = " ".join(line[2:] for line in match.group(1).splitlines())
-        folder, *words = match.group(2).split()
-        rooms[folder] = Room(folder, comment, words)
+    for root, path in ROOTS.items():
+        text = (path / "CMakeLists.txt").read_text()
+        for match in re.finditer(r"((?:^# .*\n)*)^crt_room\(([^)]*)\)", text, re.MULTILINE):
+            comment = " ".join(line[2:] for line in match.group(1).splitlines())
+            folder, *words = match.group(2).split()
+            rooms[folder] = Room(root, folder, comment, words)
     return rooms
 
 
@@ -84,9 +95,9 @@ def seen_from(rooms, folder):
 
 
 def room_of(rooms, header):
-    """The room of "film/film.h", or None for a header that is not of core/."""
+    """The room of "film/film.h", or None for a header of no room."""
     folder = str(pathlib.PurePosixPath(header).parent)
-    if not (CORE / header).is_file():
+    if not any((path / header).is_file() for path in ROOTS.values()):
         return None
     for name, room in rooms.items():
         if header in room.parts["HEADERS"]:
@@ -94,62 +105,72 @@ def room_of(rooms, header):
     return folder if folder in rooms else None
 
 
+def files_of(*suffixes):
+    """(root, path, its name from there) of each file below the roots."""
+    for root, path in ROOTS.items():
+        for file in sorted(path.rglob("*")):
+            if file.suffix in suffixes:
+                yield root, file, file.relative_to(path)
+
+
 def check_sources(rooms):
-    for entry in sorted(CORE.iterdir()):
-        if entry.is_file() and entry.name != "CMakeLists.txt":
-            yield f"core/{entry.name} lies outside every room"
-    for file in sorted(CORE.rglob("*.h")):
-        folder = str(file.parent.relative_to(CORE))
-        if folder not in rooms and folder not in BESIDE and not folder.startswith("include/"):
-            yield f"core/{file.relative_to(CORE)} lies outside every room"
-    for file in sorted(CORE.rglob("*.cpp")):
-        name = str(file.relative_to(CORE))
-        folder = str(pathlib.PurePosixPath(name).parent)
-        if folder in BESIDE:
+    for root, path in ROOTS.items():
+        for entry in sorted(path.iterdir()):
+            if entry.is_file() and entry.name != "CMakeLists.txt":
+                yield f"{root}/{entry.name} lies outside every room"
+    for root, file, name in files_of(".h", ".cpp"):
+        folder = str(name.parent)
+        if folder in BESIDE or folder.startswith("include/"):
             continue
-        if folder not in rooms:
-            yield f"core/{name}: {folder} is no room of core/CMakeLists.txt"
-        elif file.name not in rooms[folder].parts["SOURCES"] and name not in OTHER_TARGETS:
-            yield f"core/{name} is in no target"
+        if root == "plugins" and name.parts[0] in BACKENDS:
+            continue
+        if folder not in rooms or rooms[folder].root != root:
+            yield f"{root}/{name} lies outside every room"
+        elif file.suffix == ".cpp" and not (
+            file.name in rooms[folder].parts["SOURCES"] or str(name) in OTHER_TARGETS
+        ):
+            yield f"{root}/{name} is in no target"
 
 
 def check_includes(rooms):
-    for file in sorted(CORE.rglob("*")):
-        if file.suffix not in (".h", ".cpp"):
-            continue
-        folder = str(file.parent.relative_to(CORE))
-        if str(file.relative_to(CORE)) in OTHER_TARGETS:
+    linked = {**BESIDE, **BACKENDS}
+    for root, file, name in files_of(".h", ".cpp"):
+        folder = str(name.parent)
+        if str(name) in OTHER_TARGETS:
             continue  # Other targets say what they see themselves.
-        if folder in BESIDE:
-            seen = seen_from(rooms, BESIDE[folder]) | {BESIDE[folder]}
-        elif folder in rooms:
-            seen = seen_from(rooms, folder) | {folder}
-        else:
+        if folder not in linked and folder not in rooms:
             continue
+        room = linked.get(folder, folder)
+        seen = seen_from(rooms, room) | {room}
         for number, line in enumerate(file.read_text().splitlines(), 1):
             match = re.match(r'\s*#\s*include\s+"([^"]+)"', line)
-            target = room_of(rooms, match.group(1)) if match else None
+            if not match:
+                continue
+            target = room_of(rooms, match.group(1))
+            first = pathlib.PurePosixPath(match.group(1)).parts[0]
+            if target is None and root == "plugins" and first in {"..", *BACKENDS} - {folder}:
+                target = match.group(1)
             if target is not None and target not in seen:
-                yield f"core/{file.relative_to(CORE)}:{number}: {folder} does not use {target}"
+                yield f"{root}/{name}:{number}: {folder} does not use {target}"
 
 
-def check_links(rooms, text):
+def check_links(rooms):
     """crt_room() is the only place where rooms are linked to rooms."""
     targets = {target_of(folder): folder for folder in rooms}
-    for match in re.finditer(r"target_link_libraries\((\w+)([^)]*)\)", text):
-        if match.group(1) not in targets:
-            continue
-        for word in match.group(2).split():
-            if word in targets:
-                yield f"core/CMakeLists.txt links {word} to {match.group(1)} outside crt_room()"
+    for root, path in ROOTS.items():
+        text = (path / "CMakeLists.txt").read_text()
+        for match in re.finditer(r"target_link_libraries\((\w+)([^)]*)\)", text):
+            if match.group(1) not in targets:
+                continue
+            for word in match.group(2).split():
+                if word in targets:
+                    yield f"{root}/CMakeLists.txt links {word} to {match.group(1)} outside crt_room()"
 
 
 def check_roots(rooms, build):
-    for folder in rooms:
+    for folder, room in rooms.items():
         root = build / "rooms" / target_of(folder)
-        wanted = {str(h.relative_to(CORE)) for h in (CORE / folder).glob("*.h")} | set(
-            rooms[folder].parts["HEADERS"]
-        )
+        wanted = {f"{folder}/{header.name}" for header in room.path.glob("*.h")} | set(room.parts["HEADERS"])
         found = {str(h.relative_to(root)) for h in root.rglob("*.h")} if root.is_dir() else set()
         for header in sorted(found ^ wanted):
             yield f"{root.relative_to(build)}: {'has' if header in found else 'lacks'} {header}"
@@ -157,13 +178,15 @@ def check_roots(rooms, build):
 
 def draw(rooms):
     """Reading order from top to bottom; to the right what a room uses directly."""
-    width = max(len(folder) for folder in rooms)
+    width = max(len(room.name) for room in rooms.values())
     lines = ["```text"]
     for folder, room in rooms.items():
         # Rooms that another of its rooms already uses are not drawn again.
         direct = [u for u in room.uses if not any(u in seen_from(rooms, v) for v in room.uses if v != u)]
-        lines.append(f"{folder:<{width}}  →  {', '.join(direct)}".rstrip(" →"))
-        lines += [f"{beside:<{width}}  →  {room}" for beside, room in BESIDE.items() if room == folder]
+        lines.append(f"{room.name:<{width}}  →  {', '.join(direct)}".rstrip(" →"))
+        lines += [f"{name:<{width}}  →  {linked}" for name, linked in BESIDE.items() if linked == folder]
+    for name, linked in BACKENDS.items():
+        lines.append(f"{'plugins/' + name:<{width}}  →  {rooms[linked].name}")
     return "\n".join(lines) + "\n```\n"
 
 
@@ -184,15 +207,14 @@ def main():
     parser.add_argument("--write", action="store_true")
     arguments = parser.parse_args()
 
-    text = (CORE / "CMakeLists.txt").read_text()
-    rooms = read_rooms(text)
+    rooms = read_rooms()
     if arguments.draw:
         print(draw(rooms), end="")
         return 0
     if arguments.write:
         PAGE.write_text(page_with(draw(rooms)))
         return 0
-    complaints = [*check_sources(rooms), *check_includes(rooms), *check_links(rooms, text)]
+    complaints = [*check_sources(rooms), *check_includes(rooms), *check_links(rooms)]
     if arguments.build:
         complaints += check_roots(rooms, arguments.build)
     if page_with(draw(rooms)) != PAGE.read_text():

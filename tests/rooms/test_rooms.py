@@ -15,7 +15,7 @@ import check_rooms
 
 
 def first_header(folder):
-    return f"{folder}/{min(h.name for h in (check_rooms.CORE / folder).glob('*.h'))}"
+    return f"{folder}/{min(h.name for h in check_rooms.read_rooms()[folder].path.glob('*.h'))}"
 
 
 def compiles(compiler, roots, seen, header):
@@ -44,18 +44,22 @@ def check_compiler(compiler, roots):
 
 
 def check_complaints():
-    """An include against the arrows, and a header between the rooms."""
+    """An include against the arrows, a header between the rooms, and an include of another backend."""
     with tempfile.TemporaryDirectory() as name:
-        core = pathlib.Path(name) / "core"
-        shutil.copytree(check_rooms.CORE, core)
-        check_rooms.CORE = core
+        for root, path in check_rooms.ROOTS.items():
+            check_rooms.ROOTS[root] = pathlib.Path(shutil.copytree(path, pathlib.Path(name) / root))
+        core, plugins = check_rooms.ROOTS["core"], check_rooms.ROOTS["plugins"]
         rooms = check_rooms.read_rooms()
         assert [*check_rooms.check_sources(rooms), *check_rooms.check_includes(rooms)] == []
         header = core / first_header("kernel/sampling")
         header.write_text(f'#include "{first_header("kernel/geometry")}"\n' + header.read_text())
         (core / "kernel" / "between.h").write_text("")
+        (plugins / "gpu" / "gpu_device.h").write_text('#include "cuda/cuda_device.h"\n')
+        (plugins / "embree" / "plugin.cpp").write_text('#include "gpu/gpu_device.h"\n')
         assert list(check_rooms.check_includes(rooms)) == [
-            f"core/{header.relative_to(core)}:1: kernel/sampling does not use kernel/geometry"
+            f"core/{header.relative_to(core)}:1: kernel/sampling does not use kernel/geometry",
+            "plugins/embree/plugin.cpp:1: embree does not use gpu",
+            "plugins/gpu/gpu_device.h:1: gpu does not use cuda/cuda_device.h",
         ]
         assert list(check_rooms.check_sources(rooms)) == ["core/kernel/between.h lies outside every room"]
 

@@ -108,6 +108,11 @@ CRT_FN CrtWaveShare crt_wave_share(const CrtWave *wave, u32 slot) {
     return share;
 }
 
+/* The number of slots in a queue of this pass. */
+CRT_FN CRT_GLOBAL u32 *crt_queue_length(const CrtWave *wave, u32 pass, u32 queue) {
+    return wave->lengths + ((pass & 1u) * CRT_WAVE_QUEUES + queue);
+}
+
 CRT_FN CRT_GLOBAL vec4 *crt_row(const CrtWave *wave, u32 row, u32 slot) {
     return wave->rows + ((u64)row * wave->slots + slot);
 }

@@ -2,25 +2,22 @@
 /// (kernel/schedule/wavefront.h).
 #pragma once
 
-#include "kernel_spec.h"
+#include "gpu_program.h"
 
-#include "backend/sdk/launch_pacer.h"
 #include "kernel/dialect/features.h"
 #include "kernel/dialect/layout.h"
 #include "kernel/schedule/wavefront.h"
 
-#include <algorithm>
 #include <cstdint>
-#include <iterator>
 #include <map>
 #include <vector>
 
-namespace crt::plugin {
+namespace crt::gpu {
 
 struct WavePlan {
     /// crt_trace; the shader of queue 0, of queue 1, …; where there are mixes or panes, crt_choose_queue,
     /// whose queue is the last.
-    std::vector<KernelSpec> kernels;
+    Specs kernels;
     std::uint32_t queue_of_kind[32] = {};
     std::uint32_t queue_of_choice = CRT_NONE, queue_of_miss = CRT_NONE;
     std::uint32_t queues() const { return static_cast<std::uint32_t>(kernels.size() - 1); }
@@ -104,49 +101,4 @@ inline WavePlan planWave(const void* blob) {
     return plan;
 }
 
-/// The wave of a launch, but for where it is kept and what it adds to. `slices`: films side by side.
-inline kernel::CrtWave waveOf(const WavePlan& plan, const Launch& launch, std::uint32_t slices) {
-    kernel::CrtWave wave{};
-    wave.x0 = launch.x0;
-    wave.y0 = launch.y0;
-    wave.x1 = launch.x1;
-    wave.y1 = launch.y1;
-    wave.first_sample = launch.first_sample;
-    wave.sample_count = launch.sample_count;
-    wave.slices = slices;
-    std::copy(std::begin(plan.queue_of_kind), std::end(plan.queue_of_kind), wave.queue_of_kind);
-    wave.queue_of_choice = plan.queue_of_choice;
-    wave.queue_of_miss = plan.queue_of_miss;
-    return wave;
-}
-
-/// Calls `run(part)` with the launch in bands of rows of pixels such that their slots fit `slots`; `across`:
-/// slots that one row of blocks takes.
-template <class Run>
-void inBands(const Launch& launch, std::uint64_t slots, std::uint64_t across, Run&& run) {
-    const auto rows =
-        static_cast<std::uint32_t>(std::max<std::uint64_t>(1, slots / across) * CRT_WAVE_BLOCK_HEIGHT);
-    for (std::uint32_t y = launch.y0; y < launch.y1; y += rows) {
-        Launch part = launch;
-        part.y0 = y;
-        part.y1 = std::min(launch.y1, y + rows);
-        run(part);
-    }
-}
-
-/// Runs passes until all slots of a wave are done. `pass(number)` starts one; `done()` waits for those that
-/// were started and says how many slots are done. It may throw: then the wave stays as it is.
-template <class Pass, class Done>
-void runPasses(const kernel::CrtWave& wave, Pass&& pass, Done&& done) {
-    /// Between two looks at how many slots are done. A pass without any costs a few microseconds.
-    constexpr std::uint32_t kPassesAtOnce = 4;
-    // No sample takes fewer passes than one, and the last is added in one more.
-    std::uint64_t passes = (std::uint64_t{wave.sample_count} + wave.slices - 1) / wave.slices + 1;
-    std::uint32_t number = 0;
-    do {
-        for (; passes != 0; --passes) pass(number++);
-        passes = kPassesAtOnce;
-    } while (done() < wave.slots);
-}
-
-}  // namespace crt::plugin
+}  // namespace crt::gpu

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cstdint>
 
-namespace crt::plugin {
+namespace crt::gpu {
 
 inline std::uint64_t divideUp(std::uint64_t a, std::uint64_t b) { return (a + b - 1) / b; }
 
@@ -34,4 +34,4 @@ inline std::uint64_t sliceBudget(std::uint64_t device_bytes, std::uint64_t free_
     return std::min({kMostBytes, device_bytes / kShareOfDevice, free_bytes / kShareOfFree});
 }
 
-}  // namespace crt::plugin
+}  // namespace crt::gpu
