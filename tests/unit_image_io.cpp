@@ -4,6 +4,7 @@
 #include "base/error.h"
 #include "base/log.h"
 #include "base/temporary_folder.h"
+#include "captured_log.h"
 #include "catch.h"
 #include "file_bytes.h"
 #include "image/image_io.h"
@@ -129,6 +130,15 @@ TEST_CASE("PFM variants of other programs are read", "[image_io]") {
     CHECK(readImage(path).pixels == std::vector<float>{1, 2, 3});
     spit(path, "Pf\n1 2\n-1\n" + floatBytes({7, 8}));
     CHECK(readImage(path).pixels == std::vector<float>{8, 8, 8, 7, 7, 7});
+    const CapturedLog log;
+    spit(path, "Pf\r\n1 2\r\n-1\r\n" + floatBytes({7, 8}));  // lines end as DOS ends them
+    CHECK(readImage(path).pixels == std::vector<float>{8, 8, 8, 7, 7, 7});
+    CHECK(log.warnings() == 0);
+    spit(path, "Pf\n1 2\n-1\n" + floatBytes({7, 8, 9}));
+    CHECK(readImage(path).pixels == std::vector<float>{8, 8, 8, 7, 7, 7});
+    CHECK_THAT(log.text(), Contains("4 bytes follow the pixels"));
+    spit(path, "PF4\n1 1\n-1\n" + floatBytes({1, 2, 3, 4}));
+    CHECK_THROWS_WITH(readImage(path), Contains("PF (colours) or Pf (grey)"));
 }
 
 TEST_CASE("a PPM is 8-bit sRGB", "[image_io]") {

@@ -617,6 +617,22 @@ TEST_CASE("an OBJ brings texture coordinates, its MTL images", "[texture][obj]")
     CHECK((fence.opacity == .5 && fence.opacity_texture == crt::kNoTexture));
     CHECK_THAT(log.text(), Contains("c.mtl:9") && Contains("crt uses d instead"));
 
+    // Faces without vt, or with one that is not there, show Kd and d.
+    crt::spit(in + "/d.mtl", "newmtl half\nKd 0.25 0.5 1\nd 0.75\nmap_Kd Wood Tiles.exr\nmap_d mask.exr\n");
+    crt::spit(in + "/d.obj",
+              "mtllib d.mtl\nv 0 0 0\nv 0 0 1\nv 1 0 1\nv 1 0 0\nvt 0 0\nvt 0 1\nvt 1 1\nusemtl half\n"
+              "f 1/1 2/2 3/3\nf 1 3 4\nf 1/1 3/3 4/9\n");
+    const Scene half = sceneOf("crt: 1\nobjects: [{obj: d.obj}]\nenvironment: {radiance: 1}\n", in);
+    CHECK_THAT(log.text(), Contains("d.obj:11: 1 face without an image") && Contains("which has 3"));
+    REQUIRE(half.meshes[0].material.size() == 3);
+    const std::int32_t whole = half.meshes[0].material[0], bare = half.meshes[0].material[1];
+    CHECK((bare != whole && half.meshes[0].material[2] == bare));
+    const crt::Material &with_image = half.materials.at(static_cast<std::size_t>(whole)),
+                        &without = half.materials.at(static_cast<std::size_t>(bare));
+    CHECK((with_image.reflectance_texture >= 0 && with_image.opacity_texture >= 0));
+    CHECK((without.reflectance_texture == crt::kNoTexture && without.opacity_texture == crt::kNoTexture));
+    CHECK((without.opacity == .75 && without.name == "half without vt"));
+
     // A material of the scene's, on an OBJ with texture coordinates and on one without.
     const std::string own =
         "crt: 1\nmaterials: {it: {type: diffuse, reflectance: {texture: Wood Tiles.exr}}}\nobjects: [{obj: "

@@ -2,6 +2,7 @@
 #include "base/error.h"
 #include "base/standard_output.h"
 #include "cli/commands.h"
+#include "render/output_guard.h"
 #include "scene/import/import.h"
 
 #include <fmt/format.h>
@@ -54,6 +55,7 @@ int import(const Request& request) {
     ImportOptions options;
     options.allow_outside = request.allow_outside;
     if (to_file) {
+        refuseOverInputs({request.model}, {request.output}, {});
         options.folder = fs::path(request.output).parent_path().string();
         if (options.folder.empty()) options.folder = ".";
     } else {

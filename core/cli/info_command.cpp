@@ -12,6 +12,7 @@
 #include "film/error_text.h"
 #include "image/image_io.h"
 #include "image/image_metadata.h"
+#include "image/texels.h"
 #include "kernel/dialect/features.h"
 #include "render/job.h"
 #include "render/outputs.h"
@@ -20,6 +21,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <filesystem>
 #include <memory>
@@ -238,12 +240,28 @@ void showImage(const std::string& file) {
         printRow(key.c_str(), key == kWhiteLuminanceKey ? value + " cd/m² at (1, 1, 1)" : value);
 }
 
+/// True for images that crt reads as textures and does not write.
+bool isTexture(const std::string& file) {
+    std::string extension = std::filesystem::path(file).extension().string();
+    for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    return extension == ".hdr" || extension == ".jpg" || extension == ".jpeg" || extension == ".tga";
+}
+
+void showTexture(const std::string& file) {
+    const TexelsInfo info = texelsInfo(file);
+    printOut("{}: image\n", file);
+    printRow("size", fmt::format("{} x {} pixels", info.width, info.height));
+    printRow("channels", info.channels == 1 ? "grey" : "red, green, blue");
+}
+
 /// Describes a scene, a film or an image, by the extension of its name.
 int showInfo(const SceneRequest& what, bool verbose) {
     if (std::filesystem::path(what.file).extension() == kCheckpointExtension) {
         showFilm(what.file);
     } else if (formatOfFile(what.file)) {
         showImage(what.file);
+    } else if (isTexture(what.file)) {
+        showTexture(what.file);
     } else {
         showScene(what, verbose);
     }

@@ -95,13 +95,16 @@ public:
             refuseToRead(path_, fmt::format("its header has '{}' for the {}", text, what));
         return value;
     }
-    /// Pixels begin one white space after the last word.
+    /// Pixels begin one white space after the last word, or two where lines end as DOS ends them.
     std::string_view pixels(std::size_t expected_bytes) {
-        const std::size_t first = at_ + 1;
+        std::size_t first = at_ + 1;
+        if (bytes_.substr(at_, 2) == "\r\n" && bytes_.size() - first == expected_bytes + 1) ++first;
         const std::size_t there = first < bytes_.size() ? bytes_.size() - first : 0;
         if (there < expected_bytes)
             refuseToRead(path_, fmt::format("it is truncated: it has {} of {} bytes of pixels", there,
                                             expected_bytes));
+        if (there > expected_bytes)
+            logWarning("{}: {} bytes follow the pixels; crt ignores them", path_, there - expected_bytes);
         return bytes_.substr(first, expected_bytes);
     }
 
@@ -129,6 +132,8 @@ std::size_t pixelBytes(std::uint32_t width, std::uint32_t height, std::size_t by
 }
 
 Image readPfm(const std::string& path, std::string_view bytes) {
+    if (bytes.size() > 2 && std::isspace(static_cast<unsigned char>(bytes[2])) == 0)
+        refuseToRead(path, "a PFM begins with PF (colours) or Pf (grey) and a white space");
     const std::size_t channels = bytes[1] == 'F' ? 3 : 1;
     HeaderReader header(path, bytes);
     const std::uint32_t width = header.size("width");

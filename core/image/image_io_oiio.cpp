@@ -450,7 +450,7 @@ std::vector<int> colorChannels(const ImageSpec& spec) {
     std::string names;
     for (const std::string& name : spec.channelnames) names += (names.empty() ? "" : ", ") + name;
     throw Failure{"it has the channels " + names.substr(0, 200) + "; a texture needs R, G and B, or a "
-                                                                  "single channel"};
+                  "single channel other than alpha (A) and depth (Z)"};
 }
 
 std::uint32_t texelType(const ImageSpec& spec) {

@@ -6,6 +6,7 @@ and that McGuire's Cornell box has the luminance that Mitsuba 3 gives to the sam
 
 BACKEND renders the Cornell box; "none" skips that. Python's standard library only."""
 
+import base64
 import json
 import os
 import re
@@ -63,6 +64,37 @@ class Imports(CliTest):
         self.crt("compare", "model.pfm", "scene.pfm", expect=0)
         with open(self.path("model.pfm"), "rb") as one, open(self.path("scene.pfm"), "rb") as other:
             self.assertEqual(one.read(), other.read())
+
+    def test_a_missing_image_of_a_model_in_the_working_folder_is_said_and_the_rest_imported(self):
+        data = base64.b64encode(struct.pack("<15f", 0, 0, 0, 1, 0, 0, 0, 1, 0, *[0] * 6)).decode()
+        self.write("a.gltf", json.dumps({
+            "asset": {"version": "2.0"}, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+            "meshes": [{"primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_0": 1}, "material": 0}]}],
+            "materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}],
+            "textures": [{"source": 0}], "images": [{"uri": "missing.png"}],
+            "accessors": [{"componentType": 5126, "type": "VEC3", "count": 3, "bufferView": 0},
+                          {"componentType": 5126, "type": "VEC2", "count": 3, "bufferView": 1}],
+            "bufferViews": [{"buffer": 0, "byteLength": 36},
+                            {"buffer": 0, "byteOffset": 36, "byteLength": 24}],
+            "buffers": [{"byteLength": 60, "uri": "data:application/octet-stream;base64," + data}],
+        }))
+        for name in ("a.gltf", "./a.gltf"):
+            done = self.crt("import", name)
+            self.assertIn("missing.png", done.stderr)
+            self.assertNotIn("outside", done.stderr)
+
+    def test_an_import_replaces_no_model(self):
+        self.write("m.obj", SQUARE + "f 1 2 3 4\n")
+        before = open(self.path("m.obj")).read()
+        done = self.crt("import", "m.obj", "-o", "m.obj", "--overwrite", expect=2)
+        self.assertIn("would replace an input file", done.stderr)
+        self.assertEqual(open(self.path("m.obj")).read(), before)
+
+    def test_info_describes_images_that_are_textures_alone(self):
+        with open(self.path("a.hdr"), "wb") as file:
+            file.write(b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n" + bytes([128] * 8))
+        done = self.crt("info", "a.hdr")
+        self.assertIn("2 x 1 pixels", done.stdout)
 
     def test_what_was_chosen_is_said_and_written(self):
         self.write_glb()

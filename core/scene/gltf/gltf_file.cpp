@@ -88,8 +88,9 @@ std::string schemeOf(const std::string& uri) {
 
 bool isWithin(const fs::path& file, const fs::path& folder) {
     std::error_code unknown;
-    const fs::path whole = fs::weakly_canonical(folder.empty() ? "." : folder, unknown),
-                   inner = fs::weakly_canonical(file, unknown);
+    // Absolute first: of a relative path that does not exist weakly_canonical leaves a relative one.
+    const fs::path whole = fs::weakly_canonical(fs::absolute(folder.empty() ? "." : folder), unknown),
+                   inner = fs::weakly_canonical(fs::absolute(file), unknown);
     const auto [end, rest] = std::mismatch(whole.begin(), whole.end(), inner.begin(), inner.end());
     return !unknown && end == whole.end();
 }

@@ -53,7 +53,7 @@ private:
         std::vector<std::array<std::uint32_t, 3>> triangles, normals, uvs;
         std::vector<std::int32_t> material, part;  ///< As of ObjRun, where the file names any.
         std::vector<std::int32_t> used;            ///< Materials, in the order in which faces use them.
-        MeshLoss wild_normals;
+        MeshLoss wild_normals, wild_uvs;
         std::uint64_t flat_faces = 0, faces_without_position = 0, degenerate = 0, crossing = 0;
         std::uint64_t triangles_without_uv = 0;
         bool any_smooth = false;
@@ -104,15 +104,17 @@ private:
     /// Into `polygon`; false for a face that cannot be seen.
     bool takeCorners(const ObjFace& face, std::span<const ObjCorner> corners, std::vector<Vec3d>& polygon,
                      Part& part) const {
-        bool lost_position = false, lost_normal = false;
+        bool lost_position = false, lost_normal = false, lost_uv = false;
         polygon.clear();
         for (const ObjCorner& corner : corners) {
             polygon.push_back(obj_.positions[corner.position]);
             lost_position |= !isNumber(polygon.back());
+            lost_uv |= corner.uv == kBadObjUv;
             if (corner.normal == kNoObjNormal || usable(corner.normal)) continue;
             lost_normal = true;
             if (corner.normal == kBadObjNormal) part.wild_normals.add(face.line, "");
         }
+        if (lost_uv) part.wild_uvs.add(face.line, "");
         part.faces_without_position += lost_position;
         part.flat_faces += !lost_position && lost_normal;
         return !lost_position;
@@ -132,7 +134,7 @@ private:
             normal[k] = corner.normal;
             smooth &= usable(corner.normal);
             uv[k] = corner.uv;
-            has_uv &= corner.uv != kNoObjUv;
+            has_uv &= corner.uv < kBadObjUv;
         }
         if (!has_uv) uv.fill(kNoUv);
         part.triangles_without_uv += !has_uv;
@@ -151,6 +153,7 @@ private:
     void join(const Part& part) {
         triangles_ += part.triangles.size();
         wild_normals_.add(part.wild_normals);
+        wild_uvs_.add(part.wild_uvs);
         flat_faces_ += part.flat_faces;
         faces_without_position_ += part.faces_without_position;
         out_.degenerate_faces += part.degenerate;
@@ -261,6 +264,10 @@ private:
         else if (flat_faces_ > 0)
             logWarning("{}: {} shaded flat: one of their normals has no direction", path_,
                        counted(flat_faces_, "face"));
+        if (wild_uvs_.count > 0 && !obj_.uvs.empty())
+            logWarning("{}:{}: {} without an image: they use texture coordinates that are not in the file, "
+                       "which has {}",
+                       path_, wild_uvs_.line, counted(wild_uvs_.count, "face"), obj_.uvs.size());
         if (obj_.bad_uvs.count > 0)
             logWarning("{}:{}: {}; taken for (0, 0), as {} in all", path_, obj_.bad_uvs.line,
                        obj_.bad_uvs.sentence, counted(obj_.bad_uvs.count, "pair"));
@@ -324,7 +331,7 @@ private:
     LoadedMesh out_;
     std::vector<std::int32_t> material_index_;  ///< By the name's number in the OBJ; −1: not used yet.
     std::vector<Part> parts_;
-    MeshLoss wild_normals_;
+    MeshLoss wild_normals_, wild_uvs_;
     std::size_t triangles_ = 0, triangles_without_uv_ = 0;
     std::uint64_t flat_faces_ = 0, faces_without_position_ = 0, crossing_polygons_ = 0;
     bool any_faces_ = false, any_smooth_ = false;

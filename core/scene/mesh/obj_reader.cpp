@@ -195,6 +195,7 @@ private:
             texture < field.size() ? field.find('/', texture + 1) : std::string_view::npos;
         if (texture + 1 < field.size()) {
             const std::string_view uv = field.substr(texture + 1, second - texture - 1);
+            if (!uv.empty()) corner.uv = kBadObjUv;
             if (!uv.empty() && readIndex(uv, at)) {
                 if (at < 0)
                     addBackwards(number, at, part_.uvs.size(), ObjPart::Backwards::What::Uv);
@@ -454,7 +455,7 @@ private:
                     place.missing = {too_large ? part.beyond[beyond].second : corner.position, face.line};
                 if (corner.normal != kNoObjNormal && corner.normal >= normals_)
                     corner.normal = kBadObjNormal;
-                if (corner.uv >= uvs_) corner.uv = kNoObjUv;
+                if (corner.uv != kNoObjUv && corner.uv >= uvs_) corner.uv = kBadObjUv;
             }
         }
         obj_.blocks[i] = std::move(part.block);

@@ -18,12 +18,13 @@ namespace crt {
 struct ObjCorner {
     std::uint32_t position;
     std::uint32_t normal;  ///< kNoObjNormal where it names none, kBadObjNormal where that is not there.
-    std::uint32_t uv = 0xffffffffu;  ///< kNoObjUv where it names none that is there.
+    std::uint32_t uv = 0xffffffffu;  ///< kNoObjUv where it names none, kBadObjUv where that is not there.
     bool operator==(const ObjCorner&) const = default;
 };
 inline constexpr std::uint32_t kNoObjNormal = 0xffffffffu;
 inline constexpr std::uint32_t kBadObjNormal = 0xfffffffeu;
 inline constexpr std::uint32_t kNoObjUv = 0xffffffffu;
+inline constexpr std::uint32_t kBadObjUv = 0xfffffffeu;
 
 /// A polygon: a run of corners, and where it stands in the file.
 struct ObjFace {

@@ -174,7 +174,8 @@ struct Odd {
     void tell(const Texels& texels, const std::string& path) const {
         if (const std::size_t i = not_finite; i < texels.info.count())
             throw Error(ErrorKind::Scene,
-                        fmt::format("the image '{}' has a texel that is NaN, at x = {}, y = {}", path,
+                        fmt::format("the image '{}' has a texel that is NaN or infinite, at x = {}, y = {}; "
+                                    "replace it in the image", path,
                                     i % texels.info.width, i / texels.info.width),
                         {path});
         if (outside > 0)

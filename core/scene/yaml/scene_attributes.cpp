@@ -134,9 +134,35 @@ void MeshReader::checkTextures(const SectionReader& section, const Object& objec
     }
 }
 
+/// Triangles without texture coordinates have no place in an image: they get a material without images.
+void keepImagesFromBareTriangles(LoadedMesh& loaded) {
+    Mesh& mesh = loaded.mesh;
+    if (mesh.uv_index.empty()) return;
+    std::map<std::int32_t, std::int32_t> bare;
+    for (std::size_t t = 0; t < mesh.material.size(); ++t) {
+        if (mesh.uv_index[t][0] != kNoUv || mesh.material[t] < 0) continue;
+        const std::int32_t material = mesh.material[t];
+        const std::optional<MtlMaterial>& mtl = loaded.materials[static_cast<std::size_t>(material)].mtl;
+        if (!mtl || !(mtl->map_kd || mtl->map_d || mtl->norm)) continue;
+        const auto [at, added] =
+            bare.emplace(material, static_cast<std::int32_t>(loaded.materials.size()));
+        if (added) {
+            LoadedMaterial copy = loaded.materials[static_cast<std::size_t>(material)];
+            copy.name += " without vt";
+            copy.mtl->material.name = copy.name;
+            copy.mtl->map_kd.reset();
+            copy.mtl->map_d.reset();
+            copy.mtl->norm.reset();
+            loaded.materials.push_back(std::move(copy));
+        }
+        mesh.material[t] = at->second;
+    }
+}
+
 /// Images that the materials of an OBJ name take the place of what they stand for where they can be read;
 /// else that stays, with a warning.
 void MeshReader::addMaps(LoadedMesh& loaded, const std::string& path) {
+    keepImagesFromBareTriangles(loaded);
     std::map<std::string_view, std::size_t> without_uvs;
     const auto add = [&](const std::optional<MtlMap>& map, std::string_view keyword, const TexelUse& use,
                          std::string_view instead, TextureIndex& into) {
@@ -162,7 +188,7 @@ void MeshReader::addMaps(LoadedMesh& loaded, const std::string& path) {
         add(mtl.norm, "norm", {.kind = TexelKind::Normals}, "left out", mtl.material.normal_texture);
     }
     for (const auto& [keyword, count] : without_uvs)
-        logWarning("{}: {} of {} material{} left out: the file has no texture coordinates (vt)", path,
+        logWarning("{}: {} of {} material{} left out: no face has texture coordinates (vt)", path,
                    keyword, count, count == 1 ? "" : "s");
 }
 
