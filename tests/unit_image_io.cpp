@@ -130,7 +130,7 @@ TEST_CASE("PFM variants of other programs are read", "[image_io]") {
     CHECK(readImage(path).pixels == std::vector<float>{1, 2, 3});
     spit(path, "Pf\n1 2\n-1\n" + floatBytes({7, 8}));
     CHECK(readImage(path).pixels == std::vector<float>{8, 8, 8, 7, 7, 7});
-    const CapturedLog log;
+    const test::CapturedLog log;
     spit(path, "Pf\r\n1 2\r\n-1\r\n" + floatBytes({7, 8}));  // lines end as DOS ends them
     CHECK(readImage(path).pixels == std::vector<float>{8, 8, 8, 7, 7, 7});
     CHECK(log.warnings() == 0);
