@@ -623,7 +623,7 @@ TEST_CASE("an OBJ brings texture coordinates, its MTL images", "[texture][obj]")
               "mtllib d.mtl\nv 0 0 0\nv 0 0 1\nv 1 0 1\nv 1 0 0\nvt 0 0\nvt 0 1\nvt 1 1\nusemtl half\n"
               "f 1/1 2/2 3/3\nf 1 3 4\nf 1/1 3/3 4/9\n");
     const Scene half = sceneOf("crt: 1\nobjects: [{obj: d.obj}]\nenvironment: {radiance: 1}\n", in);
-    CHECK_THAT(log.text(), Contains("d.obj:11: 1 face without an image") && Contains("which has 3"));
+    CHECK_THAT(log.text(), Contains("d.obj:12: 1 face without an image") && Contains("which has 3"));
     REQUIRE(half.meshes[0].material.size() == 3);
     const std::int32_t whole = half.meshes[0].material[0], bare = half.meshes[0].material[1];
     CHECK((bare != whole && half.meshes[0].material[2] == bare));
