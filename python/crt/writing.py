@@ -96,12 +96,24 @@ def to_text(content, remarks):
     return yaml(plain(content), remarks)
 
 
-def to_file(content, remarks, path, overwrite):
+def refuse_over_inputs(path, beside, inputs):
+    """Raises crt.Error where the scene would replace one of the files `inputs`, or its folder one in it."""
+    for name in inputs:
+        if path.exists() and os.path.exists(name) and os.path.samefile(path, name):
+            same = os.fspath(path) == name
+            raise Error(f"the output '{path}' would replace " + ("an input file" if same else
+                        f"the input '{name}': they are the same file"), Kind.USAGE)
+        if beside.resolve() in pathlib.Path(name).resolve().parents:
+            raise Error(f"the folder '{beside}' of the output would replace the input '{name}'", Kind.USAGE)
+
+
+def to_file(content, remarks, path, overwrite, inputs=()):
     """Writes the scene, and larger meshes and images to the folder NAME.meshes beside it. Each appears
-    complete or not at all. Raises crt.Error of kind USAGE where there is something already, of kind OUTPUT
-    where it cannot be written."""
+    complete or not at all. Raises crt.Error of kind USAGE where there is something already, or where one of
+    the files `inputs` would be replaced; of kind OUTPUT where it cannot be written."""
     path = pathlib.Path(path)
     beside = path.with_name(path.stem + ".meshes")
+    refuse_over_inputs(path, beside, inputs)
     for there in (path, beside):
         if there.exists() and not overwrite:
             raise Error(f"'{there}' exists and may have been edited by hand; --overwrite (Python: "

@@ -83,6 +83,45 @@ def test_parameters_of_mitsuba_are_given_by_name(tmp_path):
     assert run(source, cwd=tmp_path).returncode == 3
 
 
+@pytest.mark.parametrize("name, text, given, said", [
+    ("s.xml", '<scene><shape type="sphere"><float name="radius" value="$size"/></shape></scene>',
+     ["-D", "size=2"], "uses the parameter '$sise'; did you mean 'size'?"),
+    ("s.pbrt", SCENE, [], "has no parameter 'sise'")])
+def test_a_parameter_that_the_scene_does_not_use_is_an_error(tmp_path, name, text, given, said):
+    source = written(tmp_path, name, text)
+    done = run(source, *given, "-D", "sise=3", "-o", "made.yaml", cwd=tmp_path)
+    assert done.returncode == 2 and said in done.stderr and os.listdir(tmp_path) == [name]
+
+
+def test_an_import_replaces_none_of_its_inputs(tmp_path):
+    quad = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n" \
+           "property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n" \
+           "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"
+    for name, text in (("part.pbrt", 'Shape "plymesh" "string filename" "made.meshes/m.ply"\n'),
+                       ("grey.spd", "400 1\n700 1\n"), ("made.meshes/m.ply", quad),
+                       ("s.pbrt", SCENE + 'Include "part.pbrt"\nMaterial "diffuse" '
+                        '"spectrum reflectance" "grey.spd"\nShape "sphere"\n')):
+        written(tmp_path, name, text)
+    os.link(tmp_path / "part.pbrt", tmp_path / "link.yaml")
+    before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    for output, said in (("s.pbrt", "the output 's.pbrt' would replace an input file"),
+                         ("part.pbrt", "would replace an input file"),
+                         ("link.yaml", "would replace the input 'part.pbrt': they are the same file"),
+                         ("grey.spd", "would replace an input file"),
+                         ("made.yaml", "the folder 'made.meshes' of the output would replace the input")):
+        done = run("s.pbrt", "-o", output, "--overwrite", cwd=tmp_path)
+        assert done.returncode == 2 and said in done.stderr, done.stderr
+    assert before == {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+
+
+def test_what_is_no_scene_is_refused_with_all_endings(tmp_path):
+    for arguments in (["s.yaml"], ["-o", "m.obj", "s.yaml"]):
+        done = run(*arguments, cwd=tmp_path)
+        assert done.returncode == 2 and done.stderr == (
+            "crt: error: crt cannot import 's.yaml': it reads .glb, .gltf, .obj, .ply, .xml, .pbrt and "
+            ".pbrt.gz\n")
+
+
 def test_models_go_to_the_program(tmp_path):
     written(tmp_path, "m.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
     done = run("m.obj", cwd=tmp_path)

@@ -301,6 +301,9 @@ def test_what_crt_lacks_is_listed_once_with_its_count(tmp_path):
     ("<scene><sensor type='perspective'><film type='hdrfilm'><integer name='width' value='1000000000'/>"
      "</film></sensor></scene>", 1, 35, "65535"),
     ("<world/>", 1, 1, "<world>"),
+    ("<scene><sensor type='perspective'>\n<float name='fov' value='180'/></sensor></scene>", 2, 1,
+     "smaller than 180 degrees"),
+    ("<scene><shape type='ply'>\n<string name='filename' value='.'/></shape></scene>", 2, 1, "is a folder"),
     ("<scene><shape type='sphere'><string name='center' value='0 0 1'/></shape></scene>", 1, 29,
      "three numbers"),
     ('<!DOCTYPE s [<!ENTITY a "b">]><scene/>', 1, 25, "entities"),
@@ -346,3 +349,24 @@ def test_a_mesh_is_smooth_where_mitsuba_works_normals_out(tmp_path):
     assert (first["normals"], first["crease_angle_deg"]) == ("smooth", 180)
     assert flat["normals"] == "flat" and "normals" not in own
     assert turned_over["mesh"]["normals"].tolist() == [[0, 0, -2]] * 3
+
+
+def test_older_names_in_newer_scenes_are_large_losses(tmp_path):
+    path = written(tmp_path, "s.xml", """<scene version="3.0.0">
+<shape type="sphere" id="a"><transform name="toWorld"><translate x="1"/></transform>
+<bsdf type="plastic"><float name="intIOR" value="1.3"/>
+<texture type="checkerboard" name="diffuseReflectance"/></bsdf></shape>
+<shape type="sphere"><float name="wobbleWidth" value="1"/></shape>
+<integrator type="sppm"><integer name="maxDepth" value="3"/></integrator>
+<shape type="instance">
+<transform name="toWorld"/><shape type="shapegroup"><shape type="sphere"/></shape></shape>
+</scene>""")
+    found = {loss.first.line: (loss.what, loss.large) for loss in crt.import_scene(path).losses
+             if loss.first.line != 6 or loss.large}
+    assert found == {2: ("'toWorld' of shape 'sphere'; did you mean 'to_world'?", True),
+                     3: ("'intIOR' of bsdf 'plastic'; did you mean 'int_ior'?", True),
+                     4: ("'diffuseReflectance' of bsdf 'plastic'; did you mean 'diffuse_reflectance'?",
+                         True),
+                     5: ("'wobbleWidth' of shape 'sphere'", False),
+                     6: ("'maxDepth' of integrator 'sppm'; did you mean 'max_depth'?", True),
+                     8: ("'toWorld' of shape 'instance'; did you mean 'to_world'?", True)}

@@ -314,6 +314,11 @@ def test_what_crt_lacks_is_listed_once_with_its_count(tmp_path):
     ('Texture "t" "float" "scale" "texture tex" "t"\nShape "sphere" "texture alpha" "t"', 1, 29,
      "contains itself"),
     ('Shape "sphere" "float radius" -1', 1, 1, "above 0"),
+    ('Camera "perspective"\n"float fov" 0', 2, 1, "larger than 0"),
+    ('Camera "perspective" "float fov" 200', 1, 22, "smaller than 180 degrees"),
+    ('Shape "plymesh" "string filename" "."', 1, 17, "is a folder"),
+    ('LightSource "infinite" "spectrum L" "."', 1, 24, "is a folder"),
+    ('AreaLightSource "diffuse" "string filename" "no.png"\nShape "sphere"', 1, 27, "does not exist"),
 ])
 def test_errors_have_their_place(tmp_path, text, line, column, phrase):
     path = written(tmp_path, "scene.pbrt", text)
@@ -362,3 +367,32 @@ def test_matrices_are_given_by_columns(tmp_path):
                      before="Scale -1 1 1\n" + LOOK)
         matrix = crt.import_scene(path).content["objects"][0]["transform"][0]["matrix"]
         assert matrix[3:12:4] == wanted
+
+
+def test_the_scale_of_a_texture_is_a_texture_of_numbers(tmp_path):
+    def made(tex, scale):
+        return material(tmp_path, f'Texture "a" "float" {scale}\nTexture "b" "spectrum" "scale" {tex} '
+                        '"texture scale" "a"\nMaterial "diffuse" "texture reflectance" "b"')["reflectance"]
+    assert made('"rgb tex" [.5 .5 .5]', '"constant" "float value" .5') == 0.25
+    assert made('"rgb tex" [.4 .2 .1]', '"constant" "float value" .5')["scale"] == 0.5
+    written(tmp_path, "a.pfm", pfm(np.full((2, 2, 3), 0.5)))
+    found = made('"rgb tex" [.5 .5 .5]', '"imagemap" "string filename" "a.pfm"')
+    assert found["factor"] == 0.5 and "color_space" not in found
+
+
+def test_files_may_begin_with_a_byte_order_mark(tmp_path):
+    path = written(tmp_path, "s.pbrt", b'\xef\xbb\xbfWorldBegin\nInclude "a.pbrt"\n')
+    written(tmp_path, "a.pbrt", b'\xef\xbb\xbfShape "sphere"\n')
+    assert len(crt.import_scene(path).content["objects"]) == 1
+
+
+def test_the_second_value_of_a_spectrum_counts_in_version_3_and_is_said_else(tmp_path):
+    text = 'WorldBegin\nLightSource "point" "blackbody I" [6500 3 ]\n'
+    one = crt.import_scene(written(tmp_path, "s.pbrt", text.replace("3 ]", "]"))).content["lights"][0]
+    made = crt.import_scene(written(tmp_path, "s.pbrt", text))
+    assert [loss.what for loss in made.losses] == ["'I' of light 'point' with 2 values"]
+    assert made.content["lights"][0] == one
+    of_version_3 = crt.import_scene(written(tmp_path, "s.pbrt", text + "WorldEnd\n"))
+    assert [loss.what for loss in of_version_3.losses] == ["a scene of pbrt-v3"]
+    near(of_version_3.content["lights"][0]["radiant_intensity"]["scale"],
+         3 * one["radiant_intensity"]["scale"], 1e-9)

@@ -7,7 +7,7 @@ import pathlib
 from ..errors import Error, Kind
 from ..scenes import Scene, scene
 from ..writing import relative
-from .losses import reading, refuse_infinite
+from .losses import absence, reading, refuse_infinite
 
 ENDINGS = (".xml", ".pbrt", ".pbrt.gz")
 
@@ -16,11 +16,12 @@ ENDINGS = (".xml", ".pbrt", ".pbrt.gz")
 class Imported:
     """A scene of another program: `scene` is a crt.Scene, `content` a dict with the keys of a scene file, in
     which meshes are arrays and files pathlib.Path, and `losses` a list of what crt has not, each kind of it
-    once (Loss: what, instead, first, count)."""
+    once (Loss: what, instead, first, count). `files_read` are the names of the files read."""
 
     scene: Scene
     content: dict
     losses: list
+    files_read: list
 
 
 def is_foreign(path):
@@ -31,23 +32,24 @@ def is_foreign(path):
 def import_scene(path, parameters=None):
     """A scene of Mitsuba 3 (.xml) or pbrt-v4 (.pbrt, .pbrt.gz) as an Imported.
 
-`parameters` is a dict of values for the $names of Mitsuba's scenes. Unsupported features are listed, with
-the
-    nearest that it has in its place; nothing that is listed is an error. Errors are crt.Error of kind SCENE
-    with file, line and column: what is no scene, files that are not there, and numbers that make none.
+    `parameters` is a dict of values for the $names of Mitsuba's scenes. Unsupported features are listed,
+    with the nearest that crt has in their place; nothing that is listed is an error. Errors are crt.Error of
+    kind SCENE with file, line and column: what is no scene, files that are not there, and numbers that make
+    none. A parameter that the scene does not use is an error of kind USAGE.
     """
     path = pathlib.Path(path)
     if not is_foreign(path):
         raise Error(f"'{path}' is not a Mitsuba (.xml) or pbrt (.pbrt, .pbrt.gz) scene", Kind.USAGE)
     if not path.is_file():
-        raise Error(f"'{path}' does not exist", Kind.SCENE)
+        raise Error(absence(path), Kind.SCENE)
     if path.suffix.lower() == ".xml":
         from . import mitsuba as reader
     else:
         from . import pbrt as reader
-    with reading(path):
+    with reading(path) as files:
         made = reader.read(path, {str(k): str(v) for k, v in (parameters or {}).items()})
         content = made.content()
         refuse_infinite(content)
     beside = relative(content, path.parent)
-    return Imported(scene(beside, directory=path.parent, name=path.name), content, made.losses.list())
+    return Imported(scene(beside, directory=path.parent, name=path.name), content, made.losses.list(),
+                    sorted(files))

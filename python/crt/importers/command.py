@@ -6,7 +6,9 @@ import sys
 
 from .. import program, writing
 from ..errors import Error, Kind
-from . import import_scene, is_foreign
+from . import ENDINGS, import_scene, is_foreign
+
+MODELS = (".glb", ".gltf", ".obj", ".ply")  # These go to the program.
 
 
 def parser():
@@ -31,8 +33,18 @@ def definitions(words):
     return dict(word.split("=", 1) for word in words)
 
 
+def refuse_others(arguments):
+    """Raises crt.Error where the arguments name files, but none that crt imports."""
+    files = [word for before, word in zip(["", *arguments], arguments)
+             if not word.startswith("-") and before not in ("-o", "--output")]
+    if files and not any(word.lower().endswith(MODELS) for word in files):
+        raise Error(f"crt cannot import '{files[0]}': it reads {', '.join(MODELS + ENDINGS[:-1])} and "
+                    f"{ENDINGS[-1]}", Kind.USAGE)
+
+
 def main(arguments):
     if not any(map(is_foreign, arguments)) and not {"-h", "--help"} & set(arguments):
+        refuse_others(arguments)
         path = str(program.path())
         os.execv(path, [path, "import", *arguments])
     given = parser().parse_args(arguments)
@@ -44,7 +56,7 @@ def main(arguments):
     if given.output == "-":
         sys.stdout.write(writing.to_text(made.content, remarks))
     else:
-        writing.to_file(made.content, remarks, given.output, given.overwrite)
+        writing.to_file(made.content, remarks, given.output, given.overwrite, made.files_read)
     report(made.losses)
     return 0
 

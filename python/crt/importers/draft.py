@@ -2,13 +2,14 @@
 paths."""
 
 import dataclasses
+import math
 import pickle
 import re
 
 import numpy as np
 
 from . import matrices, shapes
-from .losses import Losses
+from .losses import Losses, refuse
 
 MIRROR = matrices.scaling(-1, 1, 1)
 # Names that YAML and crt would read as something else.
@@ -130,6 +131,13 @@ def object_of(thing, name, mirror):
     elif not np.array_equal(places[0], np.eye(4)):
         made["transform"] = steps(places[0])
     return made | ({"emission": thing.emission} if thing.emission else {})
+
+
+def half_tangent(fov_deg, place):
+    """Of half of a camera's field of view."""
+    if not 0 < fov_deg < 180:
+        refuse(place, f"a field of view is larger than 0 and smaller than 180 degrees, not {fov_deg:g}")
+    return math.tan(math.radians(fov_deg) / 2)
 
 
 def steps(matrix):

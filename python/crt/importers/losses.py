@@ -24,9 +24,10 @@ class Place:
 
 
 def present(path, place):
-    """The path. Raises crt.Error at the place that names it, where there is no file; the error lists every
-    other file that the scene names and that does not exist either."""
+    """The path, which counts as a file that the import reads. Raises crt.Error at the place that names it,
+    where there is no file; the error lists every other file that the scene names and that is missing."""
     if path.is_file():
+        reads(path)
         return path
     reading = _reading.get()
     others = {}
@@ -36,9 +37,21 @@ def present(path, place):
             others.setdefault(str(other), where)
     lines = [f"'{other}' ({where})" for other, where in list(others.items())[:MOST_MISSING]]
     more = len(others) - len(lines)
-    refuse(place, f"the file '{path}' does not exist"
-           + (f"; these do not exist either: {', '.join(lines)}" if lines else "")
+    refuse(place, f"the file {absence(path)}"
+           + (f"; these files are missing too: {', '.join(lines)}" if lines else "")
            + (f" and {more} more" if more > 0 else ""))
+
+
+def absence(path):
+    """The end of a sentence about a path that is not that of a file."""
+    return f"'{path}' is a folder" if path.is_dir() else f"'{path}' does not exist"
+
+
+def reads(path):
+    """Records that the import reads a file."""
+    reading = _reading.get()
+    if reading is not None:
+        reading.files.add(str(path))
 
 
 def names_file(resolve, place):
@@ -59,11 +72,11 @@ MOST_MISSING = 20  # Missing files that one error lists.
 
 
 class _Reading:
-    """The state of an import: the place that it reads, the number of steps so far, and the files that the
-    scene names."""
+    """The state of an import: the place that it reads, the number of steps so far, the files that the scene
+    names, and those that the import reads."""
 
     def __init__(self, place):
-        self.place, self.steps, self.named = place, 0, []
+        self.place, self.steps, self.named, self.files = place, 0, [], {place.file}
 
 
 _reading = contextvars.ContextVar("crt_importers_reading", default=None)
@@ -91,11 +104,12 @@ def step(place, cost=1):
 
 @contextlib.contextmanager
 def reading(path):
-    """A context in which every exception becomes a crt.Error of kind SCENE with file, line and column."""
+    """A context in which every exception becomes a crt.Error of kind SCENE with file, line and column. Its
+    value is a set to which the import adds the files that it reads."""
     token = _reading.set(_Reading(Place(str(path), 1)))
     try:
         with np.errstate(all="ignore"):  # Numbers that are not finite are refused in the end.
-            yield
+            yield _reading.get().files
     except Error:
         raise
     except RecursionError:

@@ -11,7 +11,7 @@ from .mitsuba_materials import Materials
 from .mitsuba_shapes import Shapes
 from .mitsuba_tree import Reader
 from .mitsuba_values import Values
-from .draft import BLACK, Draft, Thing, has_texture, stretches
+from .draft import BLACK, Draft, Thing, half_tangent, has_texture, stretches
 
 ENDLESS = 1_000_000  # Depths that Mitsuba writes as -1; Russian roulette ends paths before.
 AREA = ("area", "directionalarea")
@@ -62,9 +62,7 @@ class Importer:
 
     def unused(self, plugin):
         """Lists parameters that nothing asked for."""
-        for name in sorted(plugin.left):
-            self.losses.add(plugin.values[name][2], f"'{name}' of {plugin}")
-        plugin.left.clear()
+        plugin.unused(self.losses)
 
     # The film, the sampler and the integrator.
 
@@ -79,9 +77,10 @@ class Importer:
             return None
         if plugin.kind not in ("path", "volpath", "volpathmis"):
             depth = int(plugin.number("max_depth", -1))
-            own = ", ".join(f"'{name}'" for name in sorted(plugin.left - {"rr_depth", "hide_emitters"}))
+            known = {"rr_depth", "hide_emitters", *plugin.older()}
+            own = ", ".join(f"'{name}'" for name in sorted(plugin.left - known))
             self.losses.add(plugin.place, f"{plugin}" + (f" with {own}" if own else ""), "path tracing")
-            plugin.left &= {"rr_depth", "hide_emitters"}
+            plugin.left &= known
         # Mitsuba counts a path's edges, crt what happens between them.
         depth = int(plugin.number("max_depth", -1))
         self.scene.integrator = {"max_depth": ENDLESS if depth < 0 else max(depth - 1, 0)}
@@ -132,7 +131,7 @@ class Importer:
         """Across the shorter side, as crt has it."""
         axis = plugin.text("fov_axis", "x")
         if plugin.has("fov"):
-            tangent = math.tan(math.radians(min(max(plugin.number("fov", 50), 1e-3), 179.9)) / 2)
+            tangent = half_tangent(plugin.number("fov", 50), plugin.place_of("fov"))
         else:
             text = str(plugin.get("focal_length", "50mm"))
             try:
@@ -298,6 +297,7 @@ class Importer:
                 self.losses.add(plugin.place, "an instance without a shapegroup")
                 return
             self.groups.setdefault(id(group), (group, []))[1].append(plugin.transform())
+            self.unused(plugin)
             return
         if plugin.kind == "merge":
             for part in plugin.all("shape"):

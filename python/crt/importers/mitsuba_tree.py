@@ -7,6 +7,7 @@ import xml.parsers.expat
 
 import numpy as np
 
+from ..errors import Error, Kind
 from . import matrices
 from .losses import FILE_COST, Place, at, names_file, present, refuse, step, suggestion
 
@@ -63,21 +64,25 @@ class Plugin:
         self.values = {}   # By name: value, tag, place.
         self.parts = []    # Name and plugin.
         self.left = set()
+        self.asked, self.listed = set(), set()
 
     def set(self, name, value, tag, place):
         self.values[name] = (value, tag, place)
         self.left.add(name)
 
     def has(self, *names):
+        self.asked.update(names)
         return any(name in self.values or self.part(name) for name in names)
 
     def get(self, name, default=None):
         """The value of a parameter; a number is a float."""
         self.left.discard(name)
+        self.asked.add(name)
         return self.values[name][0] if name in self.values else default
 
     def part(self, name):
         """The plugin that is the value of a parameter, or None."""
+        self.asked.add(name)
         return next((part for known, part in self.parts if known == name), None)
 
     def all(self, tag):
@@ -107,6 +112,26 @@ class Plugin:
             return value
         refuse(self.values[name][2], f"'{name}' of {self.tag} '{self.kind}' is a text")
 
+    def place_of(self, name):
+        """The place of a parameter; that of the plugin where the parameter is not there."""
+        return self.values[name][2] if name in self.values else \
+            next((part.place for known, part in self.parts if known == name), self.place)
+
+    def older(self):
+        """Names such as toWorld of parameters that the import asked for as to_world."""
+        names = {*self.left, *(name for name, _ in self.parts)}
+        return {name for name in names if name != snake(name) and snake(name) in self.asked}
+
+    def unused(self, losses, harmless=()):
+        """Lists parameters that nothing asked for."""
+        older = self.older()
+        for name in sorted(self.left - older - set(harmless)):
+            losses.add(self.place_of(name), f"'{name}' of {self}")
+        for name in sorted(older - self.listed):
+            losses.add(self.place_of(name), f"'{name}' of {self}; did you mean '{snake(name)}'?", large=True)
+        self.listed |= older
+        self.left.clear()
+
     def transform(self, name="to_world"):
         value = self.get(name)
         return value if isinstance(value, np.ndarray) and value.shape == (4, 4) else matrices.identity()
@@ -125,7 +150,8 @@ class Reader:
 
     def __init__(self, path, parameters):
         self.path = path
-        self.parameters = dict(parameters)
+        self.parameters, self.given = dict(parameters), set(parameters)
+        self.used = set()
         self.folders = [path.parent]
         self.ids = {}
         self.aliases = {}
@@ -139,6 +165,9 @@ class Reader:
         for plugin, name, element in self.references:
             plugin.parts[plugin.parts.index((name, element))] = (name, self.named(element))
         refuse_circles(scene, [], set())
+        for name in sorted(self.given - self.used):
+            raise Error(f"no value in '{self.path}' uses the parameter '${name}'"
+                        + suggestion(name, self.used), Kind.USAGE)
         return scene
 
     def root(self, path):
@@ -162,6 +191,7 @@ class Reader:
             if found[1] not in self.parameters:
                 refuse(element.place, f"the parameter '${found[1]}' has no value: give it a <default>, or "
                        f"-D {found[1]}=VALUE" + suggestion(found[1], self.parameters))
+            self.used.add(found[1])
             return self.parameters[found[1]]
         return re.sub(r"\$([A-Za-z_][A-Za-z0-9_]*)", value, element.attributes[name])
 

@@ -154,9 +154,7 @@ class Values:
             self.losses.add(plugin.place, "a texture on a mesh without texture coordinates", "0.5")
             return 0.5
         found = made(plugin, numbers)
-        for name in sorted(plugin.left - {"accel", "format", "raw"}):
-            self.losses.add(plugin.values[name][2], f"'{name}' of {plugin}")
-        plugin.left.clear()
+        plugin.unused(self.losses, {"accel", "format", "raw"})
         return found
 
     def emitted(self, plugin):

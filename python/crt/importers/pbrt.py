@@ -4,8 +4,9 @@ import math
 
 import numpy as np
 
+from ..errors import Error, Kind
 from . import matrices, pbrt_shapes, sky_image, spectra
-from .draft import BLACK, Draft, Thing, has_texture, stretches
+from .draft import BLACK, Draft, Thing, half_tangent, has_texture, stretches
 from .images import pixels
 from .losses import present, refuse, suggestion
 from .pbrt_materials import Materials
@@ -19,6 +20,8 @@ FILTERS = {"box": "box", "gaussian": "gaussian"}
 
 
 def read(path, parameters):
+    if parameters:
+        raise Error(f"'{path}' is a scene of pbrt, which has no parameter '{min(parameters)}'", Kind.USAGE)
     scene = Draft(path)
     state = State(scene.losses).of(path)
     Importer(scene, state).all()
@@ -154,7 +157,7 @@ class Importer:
         return half
 
     def fov(self, found):
-        tangent = math.tan(math.radians(min(max(found.number("fov", 90), 1e-3), 179.9)) / 2)
+        tangent = half_tangent(found.number("fov", 90), found.place_of("fov"))
         return 2 * math.degrees(math.atan(max(abs(min(self.half_sizes(found), key=abs)), 1e-9) * tangent))
 
     def orthographic(self, found, matrix):
@@ -292,7 +295,7 @@ class Importer:
         color = None
         if emitter.has("filename"):
             path = self.state.file(emitter.place, emitter.string("filename"))
-            image = pixels(path) if path.is_file() else None
+            image = pixels(present(path, emitter.place_of("filename")))
             self.losses.add(emitter.place, "an image that emits light", "its mean colour", large=True)
             color = None if image is None else image.mean((0, 1)).tolist()
         made = self.emission(emitter, "L", "power", scale_of)

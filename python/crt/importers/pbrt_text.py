@@ -21,7 +21,7 @@ class Text:
     def __init__(self, path):
         self.path, self.position, self.kept = path, 0, None
         try:
-            self.text = read_bytes(path).decode("utf-8", "replace")
+            self.text = read_bytes(path).decode("utf-8-sig", "replace")
         except Damaged as error:
             refuse(Place(str(path), 1), f"this is not a scene: {error}")
         self._line, self._start = 1, 0  # Of the last place that was asked for.
@@ -164,6 +164,10 @@ class Parameters:
 
     def has(self, name):
         return name in self.values
+
+    def place_of(self, name):
+        """The place of a parameter; that of the directive where the parameter is not there."""
+        return self.values[name][2] if name in self.values else self.place
 
     def raw(self, name):
         """Type, values and place; None where it is not there."""

@@ -5,9 +5,10 @@ import math
 import numpy as np
 
 from . import spectra
-from .losses import present, refuse, step, suggestion
+from .losses import absence, present, refuse, step, suggestion
 from .images import BYTES, IMAGES, pixels
 from .mitsuba_values import decoded
+from .pbrt_text import TYPES
 
 GLASSES = {"BK7": "N-BK7", "F10": "SF10", "F11": "SF11"}
 # Indices at 587.6 nm and Abbe's numbers of the catalogue.
@@ -52,10 +53,16 @@ class Values:
         kind, values, place = parameters.raw(name)
         if kind == "texture" or len(values) == 0:
             return None
+        pair = kind == "blackbody" and len(values) == 2 and self.state.version_3
+        if TYPES[kind] and len(values) > TYPES[kind] and not pair:
+            self.losses.add(place, f"'{name}' of {parameters} with {len(values) // TYPES[kind]} values",
+                            "the first value")
         if kind in ("rgb", "color"):
             return self.rgb(parameters, values, place)
         if kind == "blackbody":
-            return {"blackbody": float(min(max(values[0], 100), 1e7))}
+            # pbrt-v3 has a temperature and a scale.
+            made = {"blackbody": float(min(max(values[0], 100), 1e7))}
+            return spectra.scaled(made, max(values[1], 0)) if pair else made
         if isinstance(values, np.ndarray):
             if kind != "spectrum" or len(values) == 1:
                 return float(values[0])
@@ -90,7 +97,7 @@ class Values:
             return {"illuminant": NEAREST_ILLUMINANT[name]}
         path = self.state.file(place, name)
         if not path.is_file():
-            refuse(place, f"'{name}' is not a spectrum of pbrt, and '{path}' does not exist")
+            refuse(place, f"'{name}' is not a spectrum of pbrt, and {absence(path)}")
         try:
             return spectra.table(*spectra.read_spd(path), outside)
         except (OSError, ValueError) as error:
@@ -109,9 +116,8 @@ class Values:
         return made
 
     def light(self, parameters, name, scale):
-        """The spectrum of a light. Its luminance is `scale`, independent of its own scale; of a colour,
-        times
-        that."""
+        """The spectrum of a light. Its luminance is `scale`, independent of its own size; of a colour or a
+        spectrum with a factor, times that."""
         made = self.form(parameters, name, "zero") if parameters.has(name) else None
         if made is None:
             return spectra.d65(max(scale, 0))
@@ -120,6 +126,8 @@ class Values:
         own = spectra.luminance(made)
         if not own:
             return spectra.scaled(made, max(scale, 0)) if own is None else 0.0
+        if isinstance(made, dict):
+            own /= made.get("scale", 1)
         return spectra.scaled(made, max(scale, 0) / own)
 
     # A value that may be a texture.
@@ -180,7 +188,10 @@ class Values:
         if form == "texture":
             return self.texture(kind, values[0] if values else "", place, depth)
         if kind == "float":
-            return float(found.number(name, default))
+            number = found.number(name, default)
+            if len(values) > 1:
+                self.losses.add(place, f"'{name}' of {found} with {len(values)} numbers", "the first number")
+            return number
         made = self.form(found, name, "zero")
         return default if made is None else bounded(made)
 
@@ -240,7 +251,8 @@ class Values:
         return ({} if scale == [1, 1] else {"scale": scale}) | ({"offset": offset} if any(offset) else {})
 
     def tex_scale(self, found, kind, depth):
-        one, other = self.part(found, kind, "tex", 1.0, depth), self.part(found, kind, "scale", 1.0, depth)
+        one = self.part(found, kind, "tex", 1.0, depth)
+        other = self.part(found, "float", "scale", 1.0, depth)
         if isinstance(one, (int, float)):
             one, other = other, one
         if not isinstance(other, (int, float)):
@@ -250,6 +262,8 @@ class Values:
         if isinstance(one, (int, float)):
             return one * other
         if "texture" in one:
+            if kind == "spectrum" and one.get("color_space") == "raw":  # It was the scale.
+                one = one | {"color_space": "linear"}
             return self.factored(found, one, other, False)
         if "checker" in one:
             return one | {"checker": [scaled_part(value, other) for value in one["checker"]]}

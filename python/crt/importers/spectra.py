@@ -5,6 +5,8 @@ import pathlib
 
 import numpy as np
 
+from .losses import reads
+
 # The luminous efficiency of photopic vision, CIE 1931, every 10 nm from 360 nm (ISO/CIE 11664-1).
 EFFICIENCY_NM = np.arange(360, 831, 10)
 EFFICIENCY = np.array([
@@ -51,8 +53,9 @@ def read_spd(path):
         raise ValueError("it is no file")
     if path.stat().st_size > most:
         raise ValueError(f"it has more than {most >> 20} MB")
+    reads(path)
     found = []
-    for number, line in enumerate(pathlib.Path(path).read_text(encoding="utf-8").splitlines(), 1):
+    for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
         words = line.partition("#")[0].replace(",", " ").split()
         if not words:
             continue
