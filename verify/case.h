@@ -39,8 +39,7 @@ struct Outcome {
     std::optional<double> expected, measured;
     std::optional<stats::Interval> interval;  ///< Of kConfidence, of `measured`, where it was estimated.
     std::string tolerance;            ///< "± 0.1 %", "same bits"
-    std::string
-        note;  ///< A figure worth keeping, the or the reason why it does not apply.
+    std::string note;  ///< A figure to keep, or the reason why the case does not apply.
     std::string physics;              ///< Of a failure: what the numbers suggest.
 };
 

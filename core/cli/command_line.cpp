@@ -300,7 +300,8 @@ int CommandLine::run(const std::vector<std::string>& words) const {
     const Command* command = parser.parse(arguments);
     if (command == nullptr) return 0;
     if (const std::vector<std::string> named = parser.words(*command);
-        takesScenes(*command) && !named.empty() && isForeignScene(named.front()))
+        (takesScenes(*command) || command->name == "import") && !named.empty() &&
+        isForeignScene(named.front()))
         becomePythonPackage(sceneFirst(arguments, named.front()));  // Returns where there is none.
     return command->run(shellLine(words));
 }

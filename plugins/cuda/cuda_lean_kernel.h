@@ -22,10 +22,10 @@ bool traverses(const KernelSpec& spec);
 std::string kernelText(const std::string& wavefront_text);
 
 /// Numbers of blocks that a multiprocessor should hold at once, in the order of trying: more hide latency
-/// better, but leave each thread fewer registers. The first that spills at most kSpillBytesAllowed wins; the
-/// last is not judged. A few spilled values cost less than a fourth block gains (docs/results/cuda.md); a
-/// fifth gains where there is no tree to traverse (docs/decisions/0041-instruction-cache.md); a kernel that
-/// only traces is best with seven (docs/decisions/0042-wavefront.md).
+/// better, but leave each thread fewer registers. The first that spills at most kSpillBytesAllowed wins;
+/// the last is not judged. A few spilled values cost less than a fourth block gains; a fifth gains where
+/// there is no tree to traverse (docs/decisions/0041-instruction-cache.md); a kernel that only traces is
+/// best with seven (docs/decisions/0042-wavefront.md).
 std::vector<int> blocksPerMultiprocessor(const KernelSpec& spec);
 /// Of all stores and loads in the code of a kernel.
 constexpr std::uint32_t kSpillBytesAllowed = 128;

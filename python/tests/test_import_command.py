@@ -122,6 +122,15 @@ def test_what_is_no_scene_is_refused_with_all_endings(tmp_path):
             ".pbrt.gz\n")
 
 
+def test_the_program_hands_scenes_of_other_renderers_over(tmp_path):
+    written(tmp_path, "s.pbrt", SCENE)
+    done = subprocess.run([os.environ["CRT_PROGRAM"], "import", "s.pbrt", "-o", "made.yaml"], cwd=tmp_path,
+                          capture_output=True, text=True, timeout=900,
+                          env=os.environ | {"CRT_PYTHON": sys.executable})
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "made.yaml").read_text().startswith("crt: 1\n# From s.pbrt.\n")
+
+
 def test_models_go_to_the_program(tmp_path):
     written(tmp_path, "m.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
     done = run("m.obj", cwd=tmp_path)

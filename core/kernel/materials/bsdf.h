@@ -1,6 +1,6 @@
 /*
  * bsdf.h: how surfaces scatter. crt_bsdf_prepare reads what a material is made of, once a vertex; then
- * crt_bsdf_sample, crt_bsdf and the flags are all that layers.h and path.h use. A material is a row of
+ * crt_bsdf_sample, crt_bsdf and the flags are all that layers.h uses. A material is a row of
  * CRT_MATERIAL_LIST (features.h) and a case in each of the three; deltas, which can only be sampled, need
  * none in crt_bsdf.
  */
