@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """Links of Markdown files and notebooks lead somewhere within this repository: to a file or folder that git
 knows, and, where they name an anchor, to a heading as GitHub makes anchors of them. Exit code 1 names those
-that do not. Links to other sites are not followed.
+that do not, and functions that a table names beside a file that lacks them. Links to other sites are not
+followed.
 
     tests/rooms/check_links.py [FOLDER]      another tree than this one; what lies in it counts
 """
@@ -23,6 +24,8 @@ REFERENCE = re.compile(r"^ {0,3}\[[^\]]+\]:\s+(\S+)")
 USED = re.compile(r"\[([^\][]+)\]\[([^\][]*)\]")
 HTML = re.compile(r"<(?:a|img|source)\b[^>]*?\b(?:href|src)=[\"']([^\"']+)[\"']")
 NAMED = re.compile(r"<[a-z]+\b[^>]*?\b(?:id|name)=[\"']([^\"']+)[\"']")
+# A row of a table that says which function of a file to look at: | [file](target) | `function` |
+FUNCTION = re.compile(r"\]\(([^\s()#]+)\) \| `(\w+)` \|")
 ELSEWHERE = re.compile(r"^[a-zA-Z][a-zA-Z0-9+.-]*:|^//")
 
 
@@ -130,6 +133,15 @@ class Tree:
         return None if fragment in self.anchors[place] else f"{name or page.name} has no heading #{fragment}"
 
 
+    def lacking(self, page):
+        """(number of the line, error) of each function that the linked file lacks."""
+        for number, line in prose(text_of(page)):
+            for target, function in FUNCTION.findall(line):
+                file = pathlib.Path(page.parent, target).resolve()
+                if file in self.files and not re.search(rf"\b{function}\(", file.read_text("utf-8")):
+                    yield number, f"{target} has no function {function}"
+
+
 def main():
     tree = Tree(pathlib.Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT)
     count = broken = 0
@@ -140,6 +152,9 @@ def main():
             if why:
                 broken += 1
                 print(f"{page.relative_to(tree.root)}:{number}: {target}: {why}")
+        for number, why in tree.lacking(page):
+            broken += 1
+            print(f"{page.relative_to(tree.root)}:{number}: {why}")
     print(f"{len(tree.pages())} pages, {count} links, {broken} broken")
     return 1 if broken or not count else 0
 

@@ -38,6 +38,7 @@ BROKEN = {
     "[a](../outside.md)": "there is no ../outside.md",
     "<img src='nowhere.svg'>": "there is no nowhere.svg",
     "[x]: nowhere.md": "there is no nowhere.md",
+    "| [x](sub/b.md) | `nothing` |": "sub/b.md has no function nothing",
     "[a][nobody]": "[nobody], which is not defined",
     "[![a](sub/c.png)](nowhere.md)": "there is no nowhere.md",
     "`x` [a](nowhere.md) `y`": "there is no nowhere.md",
