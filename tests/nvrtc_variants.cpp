@@ -16,6 +16,7 @@
 #include "backend/sdk/gpu_schedule.h"
 #include "base/error.h"
 #include "compile/compile.h"
+#include "file_bytes.h"
 #include "gpu/wave_plan.h"
 #include "kernel/dialect/features.h"
 #include "kernel/dialect/layout.h"
@@ -26,8 +27,6 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
-#include <fstream>
-#include <iterator>
 #include <map>
 #include <stdexcept>
 #include <string>
@@ -117,13 +116,6 @@ void addScene(const crt::CompiledScene& scene, const std::string& name, Variants
     for (const KernelSpec& kernel : crt::gpu::planWave(scene.data()).kernels) add(kernel, name, variants);
 }
 
-std::string textOf(const char* path) {
-    std::ifstream file(path);
-    std::string text{std::istreambuf_iterator<char>(file), {}};
-    if (text.empty()) throw std::runtime_error(std::string(path) + " is missing or empty");
-    return text;
-}
-
 int run(int argc, char** argv) {
     int arch = 90, part = 1, parts = 1;
     std::string precompiled;
@@ -140,7 +132,8 @@ int run(int argc, char** argv) {
             continue;
         }
         if (std::strcmp(argv[i], "--precompiled") == 0 && i + 1 < argc) {
-            precompiled = textOf(argv[++i]);
+            precompiled = crt::slurp(argv[++i]);
+            if (precompiled.empty()) throw std::runtime_error(std::string(argv[i]) + " is missing or empty");
             continue;
         }
         if (std::strcmp(argv[i], "--only") == 0) {

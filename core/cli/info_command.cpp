@@ -16,12 +16,12 @@
 #include "kernel/dialect/features.h"
 #include "render/job.h"
 #include "render/outputs.h"
+#include "scene/import/import.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <filesystem>
 #include <memory>
@@ -242,8 +242,7 @@ void showImage(const std::string& file) {
 
 /// True for images that crt reads as textures and does not write.
 bool isTexture(const std::string& file) {
-    std::string extension = std::filesystem::path(file).extension().string();
-    for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    const std::string extension = extensionOf(file);
     return extension == ".hdr" || extension == ".jpg" || extension == ".jpeg" || extension == ".tga";
 }
 

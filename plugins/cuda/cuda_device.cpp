@@ -61,8 +61,8 @@ Driver openDriver() {
         throw PluginError(CRT_NO_DEVICE, "the NVIDIA driver is installed but sees no GPU");
     if (started == CUDA_ERROR_STUB_LIBRARY)
         throw PluginError(CRT_NO_DEVICE,
-                          "no NVIDIA driver is installed: the libcuda.so.1 that was found is the toolkit's "
-                          "stub, which is meant for linking only");
+                          "no NVIDIA driver is installed: the libcuda.so.1 that was found is the one of the "
+                          "CUDA toolkit, which serves linking alone; install the driver");
     if (started != CUDA_SUCCESS) {
         const char* text = nullptr;
         driver.cuGetErrorString(started, &text);

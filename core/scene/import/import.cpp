@@ -20,13 +20,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string extensionOf(const std::string& path) {
-    std::string extension = fs::path(path).extension().string();
-    for (char& c : extension)
-        if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-    return extension;
-}
-
 /// Text that a comment can hold.
 std::string inOneLine(std::string_view text) {
     constexpr std::size_t kMostBytes = 300;
@@ -61,6 +54,13 @@ std::unique_ptr<LoadedMesh> visibleMesh(LoadedMesh mesh, const std::string& path
 }
 
 }  // namespace
+
+std::string extensionOf(const std::string& path) {
+    std::string extension = fs::path(path).extension().string();
+    for (char& c : extension)
+        if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+    return extension;
+}
 
 bool isModel(const std::string& path) {
     const std::string extension = extensionOf(path);

@@ -10,6 +10,8 @@
 
 namespace crt {
 
+/// With its dot, in lower case: ".obj".
+std::string extensionOf(const std::string& path);
 /// By the end of the file's name: .glb, .gltf, .obj, .ply.
 bool isModel(const std::string& path);
 /// "Mitsuba" or "pbrt", by the end of the name of a scene of theirs; empty: it is none. crt's Python package
