@@ -63,7 +63,7 @@ def vector(matrix, which):
 
 def is_usable(matrix):
     """Is it finite, affine and invertible?"""
-    if not np.isfinite(matrix).all() or not np.allclose(matrix[3], [0, 0, 0, 1]):
+    if not np.isfinite(matrix).all() or np.abs(matrix[3] - [0, 0, 0, 1]).max() > 1e-5:
         return False
     linear = matrix[:3, :3]
     size = np.abs(linear).max()
@@ -75,7 +75,7 @@ def uniform_scale(matrix):
     linear = matrix[:3, :3]
     square = linear.T @ linear
     factor = math.sqrt(max(np.trace(square) / 3, 0))
-    return factor if np.allclose(square, factor**2 * np.eye(3), rtol=0, atol=1e-6 * factor**2) else None
+    return factor if np.abs(square - factor**2 * np.eye(3)).max() <= 1e-6 * factor**2 else None
 
 
 def numbers(array):
