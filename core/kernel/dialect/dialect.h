@@ -234,8 +234,8 @@ CRT_FN vec4 crt_where_less4(vec4 a, vec4 b, vec4 x, vec4 y) {
 #define CRT_FN static inline
 #define CRT_ROLLED _Pragma("GCC unroll 1") /* before a loop whose body is too long to repeat */
 #define CRT_TWICE _Pragma("GCC unroll 2")  /* before one whose turns are to overlap */
-#define CRT_HOT_FN \
-    __attribute__((always_inline)) static inline /* called twice a vertex, where a call costs 1 % */
+#define CRT_HOT_FN /* so short, or called so often, that a call costs 1 % of a render or more */ \
+    __attribute__((always_inline)) static inline
 #define CRT_CALLED_FN \
     __attribute__((noinline, unused)) static /* long, with many callers; or seldom called */
 #define CRT_SHARED_FN CRT_FN

@@ -23,13 +23,15 @@ CRT_FN f32 crt_clamp(f32 x, f32 lo, f32 hi) { return x < lo ? lo : (x > hi ? hi 
 
 /* Fused where it matters for speed: contraction is switched off everywhere, so that no compiler chooses for
  * itself, and this is the choice. */
-CRT_FN f32 dot3(vec3 a, vec3 b) { return crt_fma(V3X(a), V3X(b), crt_fma(V3Y(a), V3Y(b), V3Z(a) * V3Z(b))); }
+CRT_HOT_FN f32 dot3(vec3 a, vec3 b) {
+    return crt_fma(V3X(a), V3X(b), crt_fma(V3Y(a), V3Y(b), V3Z(a) * V3Z(b)));
+}
 
 /* Three numbers that lie one after another. */
-CRT_FN vec3 crt_load3(CRT_GLOBAL const f32 *p) { return make_vec3(p[0], p[1], p[2]); }
+CRT_HOT_FN vec3 crt_load3(CRT_GLOBAL const f32 *p) { return make_vec3(p[0], p[1], p[2]); }
 
 /* v·s + a, rounded once. */
-CRT_FN vec3 crt_fma3(vec3 v, f32 s, vec3 a) {
+CRT_HOT_FN vec3 crt_fma3(vec3 v, f32 s, vec3 a) {
     return make_vec3(crt_fma(V3X(v), s, V3X(a)), crt_fma(V3Y(v), s, V3Y(a)), crt_fma(V3Z(v), s, V3Z(a)));
 }
 
@@ -41,15 +43,15 @@ CRT_FN f32 crt_difference_of_products(f32 a, f32 b, f32 c, f32 d) {
     return crt_fma(a, b, -cd) + error;
 }
 
-CRT_FN vec3 cross3(vec3 a, vec3 b) {
+CRT_HOT_FN vec3 cross3(vec3 a, vec3 b) {
     return make_vec3(crt_difference_of_products(V3Y(a), V3Z(b), V3Z(a), V3Y(b)),
                      crt_difference_of_products(V3Z(a), V3X(b), V3X(a), V3Z(b)),
                      crt_difference_of_products(V3X(a), V3Y(b), V3Y(a), V3X(b)));
 }
 
-CRT_FN f32 length3(vec3 v) { return crt_sqrt(dot3(v, v)); }
+CRT_HOT_FN f32 length3(vec3 v) { return crt_sqrt(dot3(v, v)); }
 
-CRT_FN vec3 normalize3(vec3 v) { return v * (1.0f / length3(v)); }
+CRT_HOT_FN vec3 normalize3(vec3 v) { return v * (1.0f / length3(v)); }
 
 CRT_FN vec3 abs3(vec3 v) { return make_vec3(crt_abs(V3X(v)), crt_abs(V3Y(v)), crt_abs(V3Z(v))); }
 
