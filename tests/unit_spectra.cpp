@@ -431,6 +431,28 @@ TEST_CASE("bad spectrum files say where", "[spectra]") {
     CHECK_THROWS_WITH(readSpectrumFile("/", Outside::Clamp), Contains("directory"));
 }
 
+TEST_CASE("wavelengths in another unit than nanometres are refused, whatever the key outside is",
+          "[spectra]") {
+    for (const Outside outside : {Outside::Clamp, Outside::Zero, Outside::Error}) {
+        const auto check = [&](const char* text, int line, const char* words) {
+            const auto [sentence, at_line] = fileError(text, outside);
+            CAPTURE(text);
+            CHECK_THAT(sentence, Contains("wavelengths must be in nm") && Contains(words));
+            CHECK(at_line == line);
+        };
+        check("um,value\n0.36,0.1\n0.83,0.9\n", 2,
+              "from 0.36 to 0.83, and crt renders 360 to 830 nm; are these micrometres?");
+        check("# m\n3.6e-7 1\n8.3e-7 2\n", 2, "are these metres?");
+        check("3600 1\n8300 2\n", 1, "are these ångströms?");
+    }
+    // Each of these has a part that can be nanometres.
+    for (const char* text :
+         {"0 0.1\n500 0.2\n", "9 0.1\n10 0.2\n", "900 0.1\n2500 0.2\n", "2999 0\n4000 1\n"}) {
+        CAPTURE(text);
+        CHECK(fileError(text).first == "no error");
+    }
+}
+
 TEST_CASE("RGB reflectances give back their colour under D65", "[spectra][rgb]") {
     const double steps[] = {0, .001, .02, .1, .3, .5, .8, .97, 1};
     for (const double r : steps)
