@@ -303,7 +303,7 @@ TEST_CASE("spectrum files are found beside the scene", "[scene_yaml]") {
     for (const char* outside : {"", ", outside: clamp", ", outside: zero"})
         CHECK_THAT(refusedReflectance(std::string("{table: {nm: [0.4, 0.7], value: [0, 1]}") + outside +
                                       "}"),
-                   Contains("scene.yaml:3:43: error: wavelengths must be in nm, but these go from 0.4 to") &&
+                   Contains("scene.yaml:3:48: error: wavelengths must be in nm, but these go from 0.4 to") &&
                        Contains("are these micrometres?"));
 }
 
