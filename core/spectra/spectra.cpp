@@ -453,6 +453,20 @@ Matrix3d xyzToRgb(ColorSpace space) {
     return {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
 }
 
+std::optional<Matrix3d> linearSrgbOf(const std::array<double, 8>& primaries) {
+    constexpr double kLeastY = 1e-6, kMostGain = 1000;  // Usual spaces have entries below 5.
+    for (std::size_t i = 1; i < primaries.size(); i += 2)
+        if (!(std::abs(primaries[i]) >= kLeastY)) return std::nullopt;
+    const Matrix3d to_srgb =
+        multiply(xyzToRgb(ColorSpace::LinearSrgb),
+                 multiply(bradfordAdaptation(xyzFromChromaticity(primaries[6], primaries[7]), d65WhiteXyz()),
+                          rgbToXyz(primaries)));
+    for (const Vec3d& row : to_srgb)
+        for (const double entry : row)
+            if (!(std::abs(entry) < kMostGain)) return std::nullopt;
+    return to_srgb;
+}
+
 Matrix3d bradfordAdaptation(const Vec3d& from_white_xyz, const Vec3d& to_white_xyz) {
     // Lam 1985, as in the ICC profile specification, annex E.
     constexpr Matrix3d kCone{
