@@ -444,6 +444,7 @@ TEST_CASE("wavelengths in another unit than nanometres are refused, whatever the
               "from 0.36 to 0.83, and crt renders 360 to 830 nm; are these micrometres?");
         check("# m\n3.6e-7 1\n8.3e-7 2\n", 2, "are these metres?");
         check("3600 1\n8300 2\n", 1, "are these ångströms?");
+        check("-700 1\n-400 2\n", 1, "and wavelengths are above 0");
     }
     // Each of these has a part that can be nanometres.
     for (const char* text :

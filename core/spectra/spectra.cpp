@@ -213,7 +213,8 @@ Spectrum tableSpectrum(const std::vector<double>& wavelength_nm, const std::vect
 
 std::string refusalOfUnit(double first_nm, double last_nm) {
     constexpr double kLargestInMetres = 1e-3, kLargestInMicrometres = 10, kSmallestInAngstroms = 3000;
-    const char* const guess = last_nm < kLargestInMetres ? "are these metres? Multiply them by 1e9"
+    const char* const guess = last_nm <= 0                 ? "and wavelengths are above 0"
+                              : last_nm < kLargestInMetres ? "are these metres? Multiply them by 1e9"
                               : last_nm < kLargestInMicrometres
                                   ? "are these micrometres? Multiply them by 1000"
                               : first_nm >= kSmallestInAngstroms ? "are these ångströms? Divide them by 10"
