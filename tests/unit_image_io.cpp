@@ -207,7 +207,12 @@ TEST_CASE("8-bit images of other colour spaces are converted to sRGB", "[image_i
     const EncodedImage encoded = encodeSrgb8(white);
     CHECK(encoded.rgb == std::vector<std::uint8_t>{255, 255, 255});
     CHECK(encoded.clipped_values == 0);
-    white.chromaticities = {{0.7, 0.3, 0.2, 0.7, 0.1, 0.1, 0.3, 0.3}};
+    // Display P3 (SMPTE EG 432-1): its red is beyond that of sRGB, its grey is a grey.
+    Image p3 = rgbImage(2, 1, {1, 0, 0, 0.5f, 0.5f, 0.5f});
+    p3.chromaticities = {{0.68, 0.32, 0.265, 0.69, 0.15, 0.06, 0.3127, 0.3290}};
+    CHECK(encodeSrgb8(p3).rgb == std::vector<std::uint8_t>{255, 0, 0, 188, 188, 188});
+    CHECK(encodeSrgb8(p3).clipped_values == 3);
+    white.chromaticities = {{0.7, 0.3, 0.7, 0.3, 0.1, 0.1, 0.3, 0.3}};
     CHECK_THROWS_WITH(encodeSrgb8(white), Contains("primaries"));
 }
 

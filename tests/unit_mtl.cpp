@@ -6,7 +6,11 @@
 #include "scene/mesh/mesh_io.h"
 #include "scene/yaml/scene_yaml.h"
 
+#include <fmt/format.h>
+
+#include <array>
 #include <filesystem>
+#include <tuple>
 
 using namespace crt;
 using crt::test::CapturedLog;
@@ -295,6 +299,55 @@ TEST_CASE("d between 0 and 1 without Ni is opacity, and so is map_d", "[mesh_io]
     CHECK(glass.material.type == MaterialType::Dielectric);
     CHECK_FALSE((glass.map_d || glass.norm));
     CHECK_THAT(lost.text(), Contains("1 glass; dropped: map_d (1), norm (1)"));
+}
+
+TEST_CASE("options of images that change the picture are applied or named", "[mesh_io][mtl]") {
+    const TemporaryFolder folder;
+    folder.write("a.png", "");
+    folder.write("mesh.obj", "mtllib mesh.mtl\n" + kSquare + "usemtl m\nf 1 2 3 4\n");
+    const auto load = [&](const std::string& statement) {
+        folder.write("mesh.mtl", "newmtl m\nKd 1 1 1\n" + statement + "\n");
+        return *loadObj(folder.path() + "/mesh.obj").materials.at(0).mtl;
+    };
+    const CapturedLog log;
+    for (const char* same : {"-o 0.5 0.25 7", "-s 2 3 1", "-clamp on", "-clamp off", "-t 0 0 0", "-mm 0 1",
+                             "-mm 0.0 1.0", "-bm 0.3", "-boost 0", "-blendu on -blendv on", "-cc off"}) {
+        CAPTURE(same);
+        CHECK(load(std::string("map_Kd ") + same + " a.png").map_kd);
+    }
+    CHECK(load("map_d -imfchan b a.png").map_d->channel == 2);
+    CHECK(log.warnings() == 0);
+    const MtlMaterial moved = load("map_Kd -s 2 -o 0.5 -clamp on a.png");
+    CHECK(moved.map_kd->transform == std::array<double, 6>{2, 0, 0.5, 0, 1, 0});
+    CHECK(moved.map_kd->clamp);
+    for (const auto& [keyword, option, arguments] : {std::tuple{"map_Kd", "-mm", "0.2 0.5"},
+                                                     {"map_Kd", "-mm", "0.2"},
+                                                     {"map_d", "-mm", "0 2"},
+                                                     {"map_Kd", "-t", "0.1"},
+                                                     {"map_Kd", "-boost", "1"},
+                                                     {"norm", "-bm", "0.5"},
+                                                     {"map_Kd", "-o", "1e7"},
+                                                     {"map_Kd", "-s", "1 nan"},
+                                                     {"map_Kd", "-blendu", "off"},
+                                                     {"map_Kd", "-blendv", "off"},
+                                                     {"map_Kd", "-cc", "on"},
+                                                     {"map_Kd", "-texres", "64"},
+                                                     {"map_Kd", "-imfchan", "r"},
+                                                     {"map_d", "-imfchan", "l"},
+                                                     {"map_Kd", "-colorspace", "linear"}}) {
+        const std::string statement = fmt::format("{} {} {} a.png", keyword, option, arguments);
+        CAPTURE(statement);
+        const CapturedLog lost;
+        const MtlMaterial mapped = load(statement);
+        CHECK((mapped.map_kd || mapped.map_d || mapped.norm));
+        CHECK(lost.warnings() == 1);
+        CHECK_THAT(lost.text(),
+                   Contains(fmt::format("not applied: {} {} (1, first at mesh.mtl:3)", keyword, option)));
+    }
+    CHECK(load("d -halo 0.5").material.opacity == 0.5);
+    CHECK_THAT(log.text(), Contains("not applied: d -halo (1, first at mesh.mtl:3)"));
+    CHECK_FALSE(load("map_Kd -clamp on").map_kd);
+    CHECK_THAT(log.text(), Contains("not understood: map_Kd (1, first at mesh.mtl:3)"));
 }
 
 TEST_CASE("colours are linear unless they are said to be sRGB", "[mesh_io][mtl]") {

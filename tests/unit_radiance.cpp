@@ -164,6 +164,51 @@ TEST_CASE("a Radiance picture of XYZ becomes red, green and blue", "[texels][rad
     CHECK(toLinearSrgb(image).has_value());
 }
 
+TEST_CASE("colours of a Radiance picture with PRIMARIES become those of sRGB", "[texels][radiance]") {
+    const TemporaryFolder folder;
+    const std::string path = folder / "a.hdr", pixel = textOf({128, 32, 0, 129});
+    const auto rgbOf = [&](const std::string& lines) {
+        spit(path, "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n" + lines + "\n-Y 1 +X 1\n" + pixel);
+        return linearRgb(readTexels(path), TexelColor::Auto, path);
+    };
+    const std::vector<float> plain{1, 0.25f, 0};
+    CHECK(rgbOf("") == plain);
+    CHECK(rgbOf("PRIMARIES=0.64 0.33 0.3 0.6 0.15 0.06 0.3127 0.329\n") == plain);
+    CHECK(rgbOf("PRIMARIES=0 0 0 0 0 0 0 0\n") == plain);
+    // ITU-R BT.2087-0, table 4: BT.2020 in BT.709.
+    const std::vector<float> wide = rgbOf("PRIMARIES= .708 .292\t.170 .797 .131 .046 .3127 .3290\n");
+    CHECK(wide[0] == Approx(1.6605 - 0.5876 / 4).margin(1e-4));
+    CHECK(wide[1] == Approx(-0.1246 + 1.1329 / 4).margin(1e-4));
+    CHECK(wide[2] == Approx(-0.0182 - 0.1006 / 4).margin(1e-4));
+    CHECK(readImage(path).chromaticities);
+    for (const char* wrong :
+         {"", "1 2 3", ".64 .33 .3 .6 .15 .06 .33 x", ".64 .33 .3 .6 .15 .06 .33 .33 1"}) {
+        spit(path, kRgbe.substr(0, kRgbe.size() - 1) + "PRIMARIES=" + wrong + "\n\n-Y 1 +X 1\n" + pixel);
+        CHECK_THAT(refusalOf(path), Contains("its PRIMARIES is '") && Contains("not eight numbers"));
+    }
+    CHECK_THROWS_WITH(rgbOf("PRIMARIES=.64 .33 .64 .33 .15 .06 .33 .33\n"), Contains("span no colours"));
+}
+
+TEST_CASE("the colour correction of a Radiance picture is not divided out, and said once",
+          "[texels][radiance]") {
+    const TemporaryFolder folder;
+    const std::string path = folder / "a.hdr", pixels = "\n-Y 1 +X 1\n" + textOf({128, 128, 128, 129});
+    const auto write = [&](const std::string& lines) {
+        spit(path, "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n" + lines + pixels);
+    };
+    write("COLORCORR=2 1 0.5\nCOLORCORR= 2 1 1\n");
+    const CapturedLog log;
+    CHECK(readImage(path).pixels[0] == 1);
+    CHECK(log.warnings() == 1);
+    CHECK_THAT(log.text(),
+               Contains("a.hdr") && Contains("COLORCORR=4 1 0.5") && Contains("divide them by these"));
+    write("COLORCORR=2 4 1\nCOLORCORR=0.5 0.25 1\n");
+    CHECK(readImage(path).pixels[0] == 1);
+    CHECK(log.warnings() == 1);
+    write("COLORCORR=2\n");
+    CHECK_THAT(refusalOf(path), Contains("its COLORCORR is '2', which is not three positive numbers"));
+}
+
 TEST_CASE("the exposure of a Radiance picture is not divided out, and said once", "[texels][radiance]") {
     const TemporaryFolder folder;
     const std::string path = folder / "a.hdr", pixels = "\n-Y 1 +X 1\n" + textOf({128, 128, 128, 129});

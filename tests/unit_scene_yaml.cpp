@@ -300,6 +300,11 @@ TEST_CASE("spectrum files are found beside the scene", "[scene_yaml]") {
     CHECK_THAT(refused("environment: {radiance: {file: lmap.spd, outside: zero}}", {}, folder.path()),
                Contains("scene.yaml:2:32: error: cannot find 'lmap.spd'; searched in " + folder.path()) &&
                    Contains("did you mean 'lamp.spd'?"));
+    for (const char* outside : {"", ", outside: clamp", ", outside: zero"})
+        CHECK_THAT(refusedReflectance(std::string("{table: {nm: [0.4, 0.7], value: [0, 1]}") + outside +
+                                      "}"),
+                   Contains("scene.yaml:3:48: error: wavelengths must be in nm, but these go from 0.4 to") &&
+                       Contains("are these micrometres?"));
 }
 
 TEST_CASE("unused names are warnings, not errors", "[scene_yaml]") {

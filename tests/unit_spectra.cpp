@@ -431,6 +431,56 @@ TEST_CASE("bad spectrum files say where", "[spectra]") {
     CHECK_THROWS_WITH(readSpectrumFile("/", Outside::Clamp), Contains("directory"));
 }
 
+TEST_CASE("wavelengths in another unit than nanometres are refused, whatever the key outside is",
+          "[spectra]") {
+    for (const Outside outside : {Outside::Clamp, Outside::Zero, Outside::Error}) {
+        const auto check = [&](const char* text, int line, const char* words) {
+            const auto [sentence, at_line] = fileError(text, outside);
+            CAPTURE(text);
+            CHECK_THAT(sentence, Contains("wavelengths must be in nm") && Contains(words));
+            CHECK(at_line == line);
+        };
+        check("um,value\n0.36,0.1\n0.83,0.9\n", 2,
+              "from 0.36 to 0.83, and crt renders 360 to 830 nm; are these micrometres?");
+        check("# m\n3.6e-7 1\n8.3e-7 2\n", 2, "are these metres?");
+        check("3600 1\n8300 2\n", 1, "are these ångströms?");
+        check("-700 1\n-400 2\n", 1, "and wavelengths are above 0");
+    }
+    // Each of these has a part that can be nanometres.
+    for (const char* text :
+         {"0 0.1\n500 0.2\n", "9 0.1\n10 0.2\n", "900 0.1\n2500 0.2\n", "2999 0\n4000 1\n"}) {
+        CAPTURE(text);
+        CHECK(fileError(text).first == "no error");
+    }
+}
+
+TEST_CASE("colours of any primaries become those of sRGB", "[spectra]") {
+    const auto check = [](const std::array<double, 8>& primaries, const Matrix3d& expected, double margin) {
+        const std::optional<Matrix3d> found = linearSrgbOf(primaries);
+        REQUIRE(found);
+        for (int r = 0; r < 3; ++r)
+            for (int c = 0; c < 3; ++c) CHECK((*found)[r][c] == Approx(expected[r][c]).margin(margin));
+        const Vec3d white = multiply(*found, Vec3d{1, 1, 1});
+        for (const double v : white) CHECK(v == Approx(1));
+    };
+    // ITU-R BT.2087-0, table 4: BT.2020 in BT.709.
+    check({0.708, 0.292, 0.170, 0.797, 0.131, 0.046, 0.3127, 0.3290},
+          {{{1.6605, -0.5876, -0.0728}, {-0.1246, 1.1329, -0.0083}, {-0.0182, -0.1006, 1.1187}}}, 1e-4);
+    check(chromaticities(ColorSpace::LinearSrgb), {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}}, 1e-12);
+    // Of another white than D65: into ACEScg and back.
+    const Matrix3d back =
+        multiply(*linearSrgbOf(chromaticities(ColorSpace::AcesCg)), xyzToRgb(ColorSpace::AcesCg));
+    for (int r = 0; r < 3; ++r)
+        for (int c = 0; c < 3; ++c)
+            CHECK(back[r][c] == Approx(xyzToRgb(ColorSpace::LinearSrgb)[r][c]).margin(1e-12));
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    for (const std::array<double, 8>& none : {std::array<double, 8>{},
+                                              {0.3, 0.3, 0.3, 0.3, 0.3, 0.3, 0.3, 0.3},
+                                              {0.64, 0.33, 0.64, 0.33, 0.15, 0.06, 0.3127, 0.329},
+                                              {0.64, nan, 0.3, 0.6, 0.15, 0.06, 0.3127, 0.329}})
+        CHECK_FALSE(linearSrgbOf(none));
+}
+
 TEST_CASE("RGB reflectances give back their colour under D65", "[spectra][rgb]") {
     const double steps[] = {0, .001, .02, .1, .3, .5, .8, .97, 1};
     for (const double r : steps)

@@ -98,7 +98,8 @@ EnvironmentTexels texelsOf(const EnvironmentImage& image) {
     checkShape(image, info);
     checkSize(image, info);
     warnOfCodes(image, info);
-    for (const std::string& sentence : sentencesOf(info.tags, image.file, true)) logWarning("{}", sentence);
+    for (const std::string& sentence : sentencesOf(info.tags, image.file, PixelUse::EncodedColors))
+        logWarning("{}", sentence);
     out.width = info.width;
     out.height = info.height;
     const std::vector<float> rgb = readAt(image.place, [&] {

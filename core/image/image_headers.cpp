@@ -1,6 +1,7 @@
 #include "image/image_headers.h"
 
 #include "image/exif_orientation.h"
+#include "image/icc_profile.h"
 #include "image/memory_bound.h"
 
 #include <fmt/format.h>
@@ -245,15 +246,36 @@ void checkPngHeader(const std::string& path) {
 }
 
 CrtUnappliedTags tagsOfPng(const std::string& path) {
-    constexpr std::uint64_t kMostExifBytes = 65536;
+    constexpr std::uint64_t kMostExifBytes = 65536, kMostProfileBytes = std::uint64_t{4} << 20;
+    constexpr double kUnits = 100000;
     CrtUnappliedTags tags{};
-    bool is_srgb = false;
+    bool is_srgb = false, has_profile = false;
+    std::string profile;
     forEachPngChunk(path, [&](std::string_view name, std::uint64_t size, const ReadChunk& read) {
         if (name == "sRGB") is_srgb = true;
-        if (name == "gAMA" && size == 4) tags.gamma = static_cast<float>(bigEndianIn(read(), 0) / 100000.0);
+        if (name == "gAMA" && size == 4) tags.gamma = static_cast<float>(bigEndianIn(read(), 0) / kUnits);
+        if (name == "cHRM" && size == 32) {
+            const std::string chunk = read();  // The white comes first.
+            for (std::size_t i = 0; i < 8; ++i)
+                tags.chromaticities[(i + 6) % 8] =
+                    static_cast<float>(static_cast<double>(bigEndianIn(chunk, 4 * i)) / kUnits);
+        }
+        if (name == "iCCP") {
+            has_profile = true;
+            profile = size <= kMostProfileBytes ? nameUnlessSrgbOfPng(read()) : "of more than 4 MiB";
+        }
+        if (name == "cICP" && size == 4)
+            tags.code_points = static_cast<std::uint32_t>(bigEndianIn(read(), 0));
         if (name == "eXIf" && size <= kMostExifBytes) tags.orientation = exifOrientation(read());
     });
-    if (is_srgb) tags.gamma = 0;  // By the PNG Specification, 11.3.3.5, it counts before gAMA.
+    // PNG Specification, third edition, 4.3: cICP counts before iCCP, that before sRGB, and that before the
+    // others.
+    if (tags.code_points != 0) profile.clear();
+    if (tags.code_points != 0 || has_profile || is_srgb) {
+        tags.gamma = 0;
+        std::fill(std::begin(tags.chromaticities), std::end(tags.chromaticities), 0.0f);
+    }
+    profile.copy(tags.profile, sizeof tags.profile - 1);
     return tags;
 }
 

@@ -21,7 +21,7 @@ struct DamagedHeader : std::runtime_error {
 void checkExrHeader(const std::string& path);
 /// Throws DamagedHeader unless every chunk lies within the file, and its pixels may.
 void checkPngHeader(const std::string& path);
-/// Gamma and orientation from the chunks of a PNG that checkPngHeader() has checked.
+/// The tags in the chunks of a PNG that checkPngHeader() has checked.
 CrtUnappliedTags tagsOfPng(const std::string& path);
 /// Throws DamagedHeader when there are no pixels, or decoded they would take more than `most_bytes`.
 void checkMemory(std::uint64_t width, std::uint64_t height, std::uint64_t bytes_a_pixel,

@@ -265,9 +265,7 @@ Image readWithModule(const std::string& path) {
     const std::unique_ptr<const CrtImagePlanes, void (*)(const CrtImagePlanes*)> guard(planes,
                                                                                        module.free_image);
 
-    const CrtUnappliedTags& tags = planes->tags;
-    for (const std::string& sentence :
-         sentencesOf({tags.gamma, tags.exposure, tags.orientation}, path, true))
+    for (const std::string& sentence : sentencesOf(planes->tags, path, PixelUse::EncodedColors))
         logWarning("{}", sentence);
 
     Image image;

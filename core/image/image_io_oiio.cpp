@@ -312,14 +312,17 @@ std::unique_ptr<ImageInput> openImage(const char* path, ImageSpec& spec) {
         "formats: oiiotool IN -o OUT.exr"};
 }
 
-/// CIE XYZ as primaries.
-constexpr std::array<float, 8> kXyzPrimaries{1, 0, 0, 1, 0, 0, 1.0f / 3, 1.0f / 3};
-
 crt::image::RadianceHeader radianceHeader(const char* path) {
     crt::image::RadianceHeader header;
     const std::string why = crt::image::readRadiance(path, &header, nullptr, 0);
     if (!why.empty()) throw Failure{why};
     return header;
+}
+
+void takeTags(const crt::image::RadianceHeader& header, CrtUnappliedTags& tags) {
+    tags.exposure = static_cast<float>(header.exposure);
+    for (std::size_t k = 0; k < 3; ++k)
+        tags.color_correction[k] = static_cast<float>(header.color_correction[k]);
 }
 
 std::unique_ptr<OwnedImage> readRadianceImage(const char* path, std::uint64_t most_bytes) {
@@ -337,11 +340,11 @@ std::unique_ptr<OwnedImage> readRadianceImage(const char* path, std::uint64_t mo
     owned->float_channel_count = 3;
     owned->float_channels = owned->float_pointers.data();
     owned->floats = owned->float_values.data();
-    if (header.is_xyz) {
-        owned->primaries = kXyzPrimaries;
+    if (header.chromaticities) {
+        owned->primaries = *header.chromaticities;
         owned->chromaticities = owned->primaries.data();
     }
-    owned->tags.exposure = static_cast<float>(header.exposure);
+    takeTags(header, owned->tags);
     return owned;
 }
 
@@ -540,9 +543,10 @@ void readRadiancePart(Part part, const char* path, CrtTexelsInfo& info, const Ta
     info.height = header.height;
     info.channels = part == Part::Color ? 3 : 0;
     info.type = CRT_TEXELS_FLOAT;
-    info.has_chromaticities = header.is_xyz;
-    if (header.is_xyz) std::copy(kXyzPrimaries.begin(), kXyzPrimaries.end(), info.chromaticities);
-    info.tags.exposure = static_cast<float>(header.exposure);
+    info.has_chromaticities = header.chromaticities.has_value();
+    if (header.chromaticities)
+        std::copy(header.chromaticities->begin(), header.chromaticities->end(), info.chromaticities);
+    takeTags(header, info.tags);
     if (to.data != nullptr && part == Part::Color)
         require(crt::image::readRadiance(path, &header, reinterpret_cast<float*>(to.data),
                                          to.bytes / sizeof(float)));

@@ -18,8 +18,8 @@ extern "C" {
 
 #define CRT_IMAGE_MODULE_FILE "crt_image_oiio.so"
 /* The symbol carries the version: a module of another version does not have it. */
-#define CRT_IMAGE_MODULE_ENTRY crt_image_module_v5
-#define CRT_IMAGE_MODULE_ENTRY_NAME "crt_image_module_v5"
+#define CRT_IMAGE_MODULE_ENTRY crt_image_module_v6
+#define CRT_IMAGE_MODULE_ENTRY_NAME "crt_image_module_v6"
 
 typedef struct CrtImageText {
     const char *name;
@@ -28,9 +28,13 @@ typedef struct CrtImageText {
 
 /* Properties of the pixels that a file states and crt does not apply; 0: none. */
 typedef struct CrtUnappliedTags {
-    float gamma;          /* PNG: gAMA, where no sRGB overrides it */
-    float exposure;       /* Radiance HDR: what its pixels were multiplied by */
-    uint32_t orientation; /* JPEG and PNG: EXIF, 1 to 8; 1 is as the pixels lie */
+    float gamma;               /* PNG: gAMA, unless sRGB, iCCP or cICP overrides it */
+    float exposure;            /* Radiance HDR: what its pixels were multiplied by */
+    float color_correction[3]; /* Radiance HDR: what red, green and blue were multiplied by */
+    float chromaticities[8]; /* PNG: cHRM as {Rx, Ry, …, Wx, Wy}, unless sRGB, iCCP or cICP overrides it */
+    uint32_t code_points;    /* PNG: cICP, its four bytes, primaries first */
+    uint32_t orientation;    /* JPEG and PNG: EXIF, 1 to 8; 1 is as the pixels lie */
+    char profile[64];        /* JPEG and PNG: the name of an ICC profile of other colours than sRGB */
 } CrtUnappliedTags;
 
 /* Pixels row-major, top row first. */

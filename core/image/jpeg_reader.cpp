@@ -1,12 +1,15 @@
 #include "image/jpeg_reader.h"
 
 #include "image/exif_orientation.h"
+#include "image/icc_profile.h"
 #include "image/image_headers.h"
 
 #include <csetjmp>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <filesystem>
+#include <string>
 #include <string_view>
 
 #include <jpeglib.h>
@@ -20,7 +23,7 @@ namespace {
 /// encoders make some ten.
 constexpr int kMostScans = 64;
 
-constexpr int kExifMarker = JPEG_APP0 + 1;
+constexpr int kExifMarker = JPEG_APP0 + 1, kProfileMarker = JPEG_APP0 + 2;
 
 struct Errors {
     jpeg_error_mgr manager;  // First: libjpeg knows the address of this alone.
@@ -39,7 +42,9 @@ struct Errors {
 void warn(j_common_ptr codec, int level) {
     if (level >= 0) return;
     const int code = codec->err->msg_code;
-    if (code != JWRN_EXTRANEOUS_DATA && code != JWRN_ADOBE_XFORM && code != JWRN_JFIF_MAJOR) fail(codec);
+    if (code != JWRN_EXTRANEOUS_DATA && code != JWRN_ADOBE_XFORM && code != JWRN_JFIF_MAJOR &&
+        code != JWRN_BOGUS_ICC)
+        fail(codec);
 }
 
 void countScans(j_common_ptr codec) {
@@ -59,6 +64,27 @@ std::uint32_t orientationIn(const jpeg_decompress_struct& codec) {
             return exifOrientation(data.substr(kMark.size()));
     }
     return 0;
+}
+
+bool hasProfile(const jpeg_decompress_struct& codec) {
+    constexpr std::string_view kMark("ICC_PROFILE\0", 12);
+    for (const jpeg_marker_struct* marker = codec.marker_list; marker != nullptr; marker = marker->next) {
+        const std::string_view data(reinterpret_cast<const char*>(marker->data), marker->data_length);
+        if (marker->marker == kProfileMarker && data.substr(0, kMark.size()) == kMark) return true;
+    }
+    return false;
+}
+
+/// No jump leaves this while the profile is held.
+void takeProfile(jpeg_decompress_struct& codec, CrtTexelsInfo& info) {
+    if (!hasProfile(codec)) return;
+    JOCTET* profile = nullptr;
+    unsigned size = 0;
+    const bool sound = jpeg_read_icc_profile(&codec, &profile, &size) != FALSE;
+    const std::string name =
+        sound ? nameUnlessSrgb({reinterpret_cast<const char*>(profile), size}, "without a name") : "damaged";
+    std::free(profile);
+    name.copy(info.tags.profile, sizeof info.tags.profile - 1);
 }
 
 /// All that lives beyond a jump: nothing here has a destructor.
@@ -81,8 +107,10 @@ bool decode(Reader& reader, std::FILE* file, CrtTexelsInfo* info, unsigned char*
     codec.progress = &reader.progress;
     jpeg_stdio_src(&codec, file);
     jpeg_save_markers(&codec, kExifMarker, 0xffff);
+    jpeg_save_markers(&codec, kProfileMarker, 0xffff);
     jpeg_read_header(&codec, TRUE);
     info->tags.orientation = orientationIn(codec);
+    takeProfile(codec, *info);
     const auto refuse = [&](const char* why) {
         std::snprintf(reader.errors.sentence, sizeof reader.errors.sentence, "%s", why);
         return false;

@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
@@ -115,19 +116,55 @@ Order orderIn(const std::string& line, RadianceHeader& header) {
     return order;
 }
 
+/// As many numbers as `Count`, separated by blanks; nothing for other texts.
+template <std::size_t Count>
+std::optional<std::array<double, Count>> numbersIn(std::string_view value) {
+    std::array<double, Count> numbers;
+    for (double& number : numbers) {
+        const std::string text(takeWord(value));
+        char* end = nullptr;
+        number = std::strtod(text.c_str(), &end);
+        if (text.empty() || *end != '\0' || !std::isfinite(number)) return std::nullopt;
+    }
+    if (!withoutSpaces(value).empty()) return std::nullopt;
+    return numbers;
+}
+
+[[noreturn]] void refuseLine(const char* key, std::string_view value, const char* expected) {
+    throw RadianceFault(
+        fmt::format("its {} is '{}', which is not {}", key, withoutSpaces(value).substr(0, 40), expected));
+}
+
 double exposureIn(std::string_view value) {
-    const std::string text(withoutSpaces(value));
-    char* end = nullptr;
-    const double exposure = std::strtod(text.c_str(), &end);
-    if (text.empty() || *end != '\0' || !std::isfinite(exposure) || !(exposure > 0))
-        throw RadianceFault(fmt::format("its EXPOSURE is '{}', which is not a positive number",
-                                        std::string_view(text).substr(0, 40)));
-    return exposure;
+    const auto exposure = numbersIn<1>(value);
+    if (!exposure || !((*exposure)[0] > 0)) refuseLine("EXPOSURE", value, "a positive number");
+    return (*exposure)[0];
+}
+
+std::array<double, 3> correctionIn(std::string_view value) {
+    const auto factors = numbersIn<3>(value);
+    if (!factors || !std::all_of(factors->begin(), factors->end(), [](double f) { return f > 0; }))
+        refuseLine("COLORCORR", value, "three positive numbers");
+    return *factors;
+}
+
+/// Nothing for zeros, which Photoshop writes.
+std::optional<std::array<float, 8>> primariesIn(std::string_view value) {
+    constexpr double kMost = 1000;  // Primaries that no eye sees are beyond 1, too.
+    const auto numbers = numbersIn<8>(value);
+    const auto isUsable = [](double number) { return std::abs(number) <= kMost; };
+    if (!numbers || !std::all_of(numbers->begin(), numbers->end(), isUsable))
+        refuseLine("PRIMARIES", value, "eight numbers");
+    std::array<float, 8> primaries;
+    std::transform(numbers->begin(), numbers->end(), primaries.begin(),
+                   [](double number) { return static_cast<float>(number); });
+    if (primaries == std::array<float, 8>{}) return std::nullopt;
+    return primaries;
 }
 
 Order takeRadianceHeader(RadianceBytes& bytes, RadianceHeader& header) {
     if (bytes.line().rfind("#?", 0) != 0) throw RadianceFault("it is not a Radiance HDR file");
-    bool has_format = false;
+    bool has_format = false, is_xyz = false;
     constexpr int kMostLines = 4096;
     for (int lines = 0;; ++lines) {
         if (lines > kMostLines) throw RadianceFault("its header has no end");
@@ -138,8 +175,8 @@ Order takeRadianceHeader(RadianceBytes& bytes, RadianceHeader& header) {
         const std::string_view key = withoutSpaces(std::string_view(line).substr(0, equals)),
                                value = withoutSpaces(std::string_view(line).substr(equals + 1));
         if (key == "FORMAT") {
-            header.is_xyz = value == "32-bit_rle_xyze";
-            if (!header.is_xyz && value != "32-bit_rle_rgbe")
+            is_xyz = value == "32-bit_rle_xyze";
+            if (!is_xyz && value != "32-bit_rle_rgbe")
                 throw RadianceFault(
                     fmt::format("its FORMAT is '{}'; the formats of Radiance pictures are "
                                 "32-bit_rle_rgbe and 32-bit_rle_xyze",
@@ -147,10 +184,16 @@ Order takeRadianceHeader(RadianceBytes& bytes, RadianceHeader& header) {
             has_format = true;
         } else if (key == "EXPOSURE") {
             header.exposure *= exposureIn(value);  // Each program that changes it adds a line.
+        } else if (key == "COLORCORR") {
+            const std::array<double, 3> factors = correctionIn(value);
+            for (std::size_t k = 0; k < 3; ++k) header.color_correction[k] *= factors[k];
+        } else if (key == "PRIMARIES") {
+            header.chromaticities = primariesIn(value);
         }
     }
     if (!has_format)
         throw RadianceFault("its header has no line FORMAT=32-bit_rle_rgbe or FORMAT=32-bit_rle_xyze");
+    if (is_xyz) header.chromaticities = {1, 0, 0, 1, 0, 0, 1.0f / 3, 1.0f / 3};
     return orderIn(bytes.line(), header);
 }
 

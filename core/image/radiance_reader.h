@@ -3,7 +3,9 @@
 /// OpenImageIO: it ignores the order of pixels and refuses half of these files.
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 
 namespace crt::image {
@@ -11,8 +13,10 @@ namespace crt::image {
 /// The contents of the header.
 struct RadianceHeader {
     std::uint32_t width = 0, height = 0;
-    bool is_xyz = false;  ///< Pixels are CIE XYZ, not red, green and blue.
-    double exposure = 1;  ///< By which the pixels have been multiplied.
+    /// {Rx, Ry, Gx, Gy, Bx, By, Wx, Wy} of its PRIMARIES, or those of CIE XYZ.
+    std::optional<std::array<float, 8>> chromaticities;
+    double exposure = 1;                              ///< By which the pixels have been multiplied.
+    std::array<double, 3> color_correction{1, 1, 1};  ///< By which red, green and blue have been.
 };
 
 bool beginsAsRadiance(const char* path);

@@ -52,9 +52,8 @@ std::optional<Matrix3d> toLinearSrgb(const Image& image) {
     if (is(ColorSpace::LinearSrgb)) return std::nullopt;
     for (const ColorSpace space : {ColorSpace::AcesCg, ColorSpace::Xyz})
         if (is(space)) return multiply(xyzToRgb(ColorSpace::LinearSrgb), inverse(xyzToRgb(space)));
-    throw Error(ErrorKind::Output,
-                "the image's primaries are neither those of sRGB, of "
-                "ACEScg nor of XYZ, so it cannot become 8-bit sRGB");
+    if (const std::optional<Matrix3d> matrix = linearSrgbOf(*image.chromaticities)) return matrix;
+    throw Error(ErrorKind::Output, "the image's primaries span no colours, so it cannot become 8-bit sRGB");
 }
 
 namespace {

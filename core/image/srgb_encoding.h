@@ -17,8 +17,7 @@ namespace crt {
 std::array<std::size_t, 3> colorChannels(const Image& image);
 
 /// From the image's colour space to linear sRGB; empty when it is sRGB already, which an image without
-/// chromaticities is taken for. Throws crt::Error(Output) for primaries that are none of sRGB's, ACEScg's
-/// and XYZ's.
+/// chromaticities is taken for. Throws crt::Error(Output) for primaries that span no colours.
 std::optional<Matrix3d> toLinearSrgb(const Image& image);
 
 /// 8-bit sRGB of an image, row-major, top row first, three bytes a pixel; what PNG and PPM hold.

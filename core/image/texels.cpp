@@ -82,7 +82,7 @@ TexelsInfo infoOf(const CrtTexelsInfo& raw) {
         std::copy_n(raw.chromaticities, 8, info.chromaticities->begin());
     }
     info.is_associated = raw.is_associated != 0;
-    info.tags = {raw.tags.gamma, raw.tags.exposure, raw.tags.orientation};
+    info.tags = raw.tags;
     return info;
 }
 
@@ -246,7 +246,7 @@ std::optional<Matrix3d> primariesToSrgb(const TexelsInfo& info, const std::strin
     try {
         return toLinearSrgb(of);
     } catch (const Error&) {
-        refuse(path, "its primaries are neither those of sRGB, of ACEScg nor of XYZ");
+        refuse(path, "its primaries span no colours");
     }
 }
 

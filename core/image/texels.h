@@ -24,7 +24,7 @@ struct TexelsInfo {
     TexelType type = TexelType::Uint8;
     std::optional<std::array<double, 8>> chromaticities;  ///< Of floats, where the file says them.
     bool is_associated = false;  ///< Colours are multiplied by the alpha beside them, as EXR has it.
-    UnappliedTags tags{};
+    CrtUnappliedTags tags{};
 
     std::uint64_t count() const { return std::uint64_t{width} * height; }
     std::uint64_t bytes() const;
@@ -69,7 +69,7 @@ enum class TexelColor {
 
 /// Linear sRGB of every texel, three floats each; grey ones repeated, colours of other primaries converted.
 /// Codes of 8 and 16 bits are in [0, 1]; floats are what the file holds, also NaN. Throws crt::Error(Scene)
-/// for primaries that crt does not know.
+/// for primaries that span no colours.
 std::vector<float> linearRgb(const Texels& texels, TexelColor color, const std::string& path);
 
 /// The linear value of each code of 8 bits (256) or 16 (65536); empty for floats.

@@ -1,21 +1,21 @@
 /// Tags of an image file that would change its pixels and that crt does not apply.
 #pragma once
 
-#include <cstdint>
+#include "image/image_module.h"
+
 #include <string>
 #include <vector>
 
 namespace crt {
 
-/// 0: the file does not have the tag.
-struct UnappliedTags {
-    double gamma = 0;               ///< PNG (gAMA): the exponent of its encoding.
-    double exposure = 0;            ///< Radiance HDR (EXPOSURE): what its pixels were multiplied by.
-    std::uint32_t orientation = 0;  ///< JPEG and PNG (EXIF): 1 is as the pixels lie.
+/// The use of an image's pixels.
+enum class PixelUse {
+    Numbers,        ///< Numbers and normals, which have no colour.
+    LinearColors,   ///< Colours proportional to light, or fractions of it.
+    EncodedColors,  ///< Colours whose codes are read as sRGB.
 };
 
-/// A sentence for each of them that would change the picture. `encoded`: codes are read as sRGB, which a
-/// gamma contradicts.
-std::vector<std::string> sentencesOf(const UnappliedTags& tags, const std::string& path, bool encoded);
+/// A sentence for each of them that would change the picture.
+std::vector<std::string> sentencesOf(const CrtUnappliedTags& tags, const std::string& path, PixelUse use);
 
 }  // namespace crt

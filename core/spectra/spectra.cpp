@@ -211,6 +211,20 @@ Spectrum tableSpectrum(const std::vector<double>& wavelength_nm, const std::vect
     return s;
 }
 
+std::string refusalOfUnit(double first_nm, double last_nm) {
+    constexpr double kLargestInMetres = 1e-3, kLargestInMicrometres = 10, kSmallestInAngstroms = 3000;
+    const char* const guess = last_nm <= 0                 ? "and wavelengths are above 0"
+                              : last_nm < kLargestInMetres ? "are these metres? Multiply them by 1e9"
+                              : last_nm < kLargestInMicrometres
+                                  ? "are these micrometres? Multiply them by 1000"
+                              : first_nm >= kSmallestInAngstroms ? "are these ångströms? Divide them by 10"
+                                                                 : nullptr;
+    if (guess == nullptr) return {};
+    return fmt::format(
+        "wavelengths must be in nm, but these go from {} to {}, and crt renders {} to {} nm; {}", first_nm,
+        last_nm, kWavelengthMin_nm, kWavelengthMax_nm, guess);
+}
+
 SampledSpectrum readSpectrumTable(const std::string& path) {
     std::string text;
     try {
@@ -225,6 +239,7 @@ SampledSpectrum readSpectrumTable(const std::string& path) {
     if (rest.starts_with("\xEF\xBB\xBF"))
         rest.remove_prefix(3);  // Spreadsheets like to write a byte-order mark.
     bool header_allowed = true;
+    int first_line = 0;
     for (int line_number = 1; !rest.empty(); ++line_number) {
         const std::size_t newline = std::min(rest.find('\n'), rest.size());
         const std::vector<std::string_view> fields = splitFields(rest.substr(0, newline));
@@ -248,10 +263,13 @@ SampledSpectrum readSpectrumTable(const std::string& path) {
         if (!wavelength.empty() && !(w > wavelength.back()))
             fail(fmt::format("wavelengths must increase, but {} nm follows {} nm", w, wavelength.back()),
                  place);
+        if (wavelength.empty()) first_line = line_number;
         wavelength.push_back(w);
         value.push_back(v);
     }
     if (wavelength.empty()) fail("this spectrum file holds no numbers", {path});
+    if (const std::string why = refusalOfUnit(wavelength.front(), wavelength.back()); !why.empty())
+        fail(why, {path, first_line});
     return table;
 }
 
@@ -434,6 +452,20 @@ Matrix3d xyzToRgb(ColorSpace space) {
         case ColorSpace::Xyz: break;
     }
     return {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
+}
+
+std::optional<Matrix3d> linearSrgbOf(const std::array<double, 8>& primaries) {
+    constexpr double kLeastY = 1e-6, kMostGain = 1000;  // Usual spaces have entries below 5.
+    for (std::size_t i = 1; i < primaries.size(); i += 2)
+        if (!(std::abs(primaries[i]) >= kLeastY)) return std::nullopt;
+    const Matrix3d to_srgb =
+        multiply(xyzToRgb(ColorSpace::LinearSrgb),
+                 multiply(bradfordAdaptation(xyzFromChromaticity(primaries[6], primaries[7]), d65WhiteXyz()),
+                          rgbToXyz(primaries)));
+    for (const Vec3d& row : to_srgb)
+        for (const double entry : row)
+            if (!(std::abs(entry) < kMostGain)) return std::nullopt;
+    return to_srgb;
 }
 
 Matrix3d bradfordAdaptation(const Vec3d& from_white_xyz, const Vec3d& to_white_xyz) {

@@ -149,6 +149,9 @@ enum class ColorSpace { LinearSrgb, AcesCg, Xyz };
 /// except what the space's white needs by definition (ACEScg is taken with its own ~D60 white,
 /// Bradford-adapted from D65).
 Matrix3d xyzToRgb(ColorSpace space);
+/// From linear RGB of any primaries, {Rx, Ry, Gx, Gy, Bx, By, Wx, Wy}, to linear sRGB, so that white stays
+/// white (Bradford). Nothing for primaries that span no colours.
+std::optional<Matrix3d> linearSrgbOf(const std::array<double, 8>& primaries);
 /// {Rx, Ry, Gx, Gy, Bx, By, Wx, Wy} for the EXR chromaticities attribute.
 std::array<double, 8> chromaticities(ColorSpace space);
 /// Bradford adaptation in XYZ that maps the white of `from_white_xyz` to `to_white_xyz`.

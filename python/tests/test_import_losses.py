@@ -89,6 +89,17 @@ def test_a_clamp_and_metals_without_loss_are_said(tmp_path):
     assert "light that a rough metal loses between its facets" in said
 
 
+def test_a_colour_in_place_of_a_number_is_said(tmp_path):
+    def said(parameter):
+        losses = of_pbrt(tmp_path, "", f'Material "dielectric" {parameter}\n' + SPHERE)
+        return [(loss.what, loss.instead) for loss in losses]
+
+    assert ("a colour as 'roughness' of material 'dielectric'", "its mean") in said(
+        '"rgb roughness" [0.1 0.2 0.3]')
+    assert said('"rgb roughness" [0.2 0.2 0.2]') == said('"float roughness" 0.2')
+    assert ("'roughness' of material 'dielectric'", "0.0") in said('"spectrum roughness" [400 0.1 700 0.2]')
+
+
 def test_an_index_of_0_or_less_renders_and_is_said(tmp_path):
     of_rgb = '<rgb name="eta" value="-0.05, 4, 4.7"/><rgb name="k" value="0, 0.1, 1.3"/>'
     of_number = '<spectrum name="eta" value="0"/><spectrum name="k" value="1"/>'

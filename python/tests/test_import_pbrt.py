@@ -319,6 +319,22 @@ def test_what_crt_lacks_is_listed_once_with_its_count(tmp_path):
     ('Shape "plymesh" "string filename" "."', 1, 17, "is a folder"),
     ('LightSource "infinite" "spectrum L" "."', 1, 24, "is a folder"),
     ('AreaLightSource "diffuse" "string filename" "no.png"\nShape "sphere"', 1, 27, "does not exist"),
+    ('Camera "perspective"\n "float fov" [60 30]', 2, 2,
+     "'fov' of camera 'perspective' is one number, not 2"),
+    ('Shape "sphere" "float radius" []', 1, 16, "one number, not 0"),
+    ('Film "rgb" "float cropwindow" [0 1 0]', 1, 12, "4 numbers, not 3"),
+    ('Film "rgb" "integer pixelbounds" [0 1 0 1 2]', 1, 12, "4 numbers, not 5"),
+    ('Camera "perspective" "float screenwindow" [1 1]', 1, 22, "4 numbers, not 2"),
+    ('LightSource "point" "point3 from" [0 0 0 1 1 1]', 1, 21, "3 numbers, not 6"),
+    ('Shape "plymesh" "string filename" ["a.ply" "b.ply"]', 1, 17, "one text, not 2"),
+    ('AreaLightSource "diffuse" "bool twosided" [true false]\nShape "sphere"', 1, 27, "one text, not 2"),
+    ('Material "diffuse" "texture reflectance" ["a" "b"]\nShape "sphere"', 1, 20, "one texture, not 2"),
+    ('Material "dielectric" "texture roughness" ["a" "b"]\nShape "sphere"', 1, 23, "one texture, not 2"),
+    ('Material "dielectric" "spectrum eta" ["glass-BK7" "glass-SF11"]\nShape "sphere"', 1, 23,
+     "one spectrum, not 2"),
+    ('Material "dielectric" "float roughness" [0.1 0.3]\nShape "sphere"', 1, 23, "one number, not 2"),
+    ('Texture "t" "float" "scale" "float scale" [1 2]\nShape "sphere" "texture alpha" "t"', 1, 29,
+     "one number, not 2"),
 ])
 def test_errors_have_their_place(tmp_path, text, line, column, phrase):
     path = written(tmp_path, "scene.pbrt", text)

@@ -124,7 +124,7 @@ def spectrum_cases(case):
     spectrum("UTF-16", "400 0.5\n700 0.5\n".encode("utf-16"), 3, "s.spd")
     spectrum("a wavelength twice", "400 0.5\n500 0.5\n500 0.6\n", 3, "s.spd:3")
     spectrum("a wavelength of 1e308", "400 0.5\n1e308 0.5\n", (0, 3))
-    spectrum("negative wavelengths", "-700 0.5\n-400 0.5\n", (0, 3))
+    spectrum("negative wavelengths", "-700 0.5\n-400 0.5\n", 3, "wavelengths are above 0")
 
 
 def light_cases(case):
@@ -162,6 +162,11 @@ def texture_cases(texture, png):
     texture("a PNG without texels", "a.png", whole[:data_at] + part(b"IEND", b""), "a.png")
     text = part(b"zTXt", b"a\0\0" + zlib.compress(b"\0" * (200 << 20), 9))
     texture("a PNG with a text of 200 MB", "a.png", whole[:data_at] + text + whole[data_at:], codes=(0, 3))
+    profile = part(b"iCCP", b"a\0\0" + zlib.compress(b"\0" * (200 << 20), 9))
+    texture("a PNG with a colour profile of 200 MB", "a.png", whole[:33] + profile + whole[33:], "(ICC) 'a'",
+            codes=0)
+    texture("a Radiance HDR of primaries without colours", "a.hdr", b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n"
+            b"PRIMARIES=.3 .3 .3 .3 .3 .3 .3 .3\n\n-Y 1 +X 1\n\x80\x80\x80\x80", "span no colours")
     texture("a PNG with two headers", "a.png", whole[:33] + whole[8:], codes=(0, 3))
     texture("a PNG with a wrong checksum", "a.png", whole[:29] + b"\0\0\0\0" + whole[33:], codes=(0, 3))
     line = b"\x02\x02\x40\x00" + (b"\xff\0" * 129 + b"\x81\0") * 4

@@ -731,6 +731,8 @@ def spectrum_cases():
         ("noise", bytes(range(128, 256)) * 100),
         ("NULs", b"\0" * 10000),
         ("a value of 1e300", "400 1e300\n700 1e300\n"),
+        ("micrometres", "0.4 0.1\n0.7 0.9\n"),
+        ("metres", "4e-7 0.1\n7e-7 0.9\n"),
         ("one wavelength of 10 MB", "400 1" + " " * 10000000),
     ):
         def prepare(folder, text=text):

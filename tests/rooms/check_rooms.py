@@ -26,6 +26,7 @@ KEYWORDS = ("SOURCES", "USES", "LIBRARIES", "HEADERS")
 OTHER_TARGETS = {
     "image/image_io_oiio.cpp",
     "image/exif_orientation.cpp",
+    "image/icc_profile.cpp",
     "image/image_headers.cpp",
     "image/jpeg_reader.cpp",
     "image/png_reader.cpp",

@@ -67,7 +67,7 @@ struct CompareResult {
     /// The error as crt states it everywhere (stats/luminance_error.h): of luminance, relative to b's mean
     /// luminance. With R, G and B only.
     std::optional<double> relative_rmse;
-    /// When both have R, G and B of known primaries, and metrics are valid.
+    /// When both have R, G and B of primaries that span colours, and metrics are valid.
     std::optional<PerceivedDifference> perceived;
     std::vector<std::string> other_channels;  ///< In one image only; they do not matter unless all_channels.
 };

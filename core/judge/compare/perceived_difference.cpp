@@ -25,7 +25,8 @@ std::optional<std::vector<float>> linearSrgb(const Image& image,
         space.chromaticities = primaries;
         matrix = toLinearSrgb(space);
     } catch (const Error&) {
-        return std::nullopt;  // Unknown primaries: there are differences to measure, but none to see.
+        return std::nullopt;  // Primaries without colours: there are differences to measure, but none to
+                              // see.
     }
     std::vector<float> values;
     values.reserve(std::size_t{3} * image.width * image.height);

@@ -18,7 +18,7 @@ struct PerceivedDifference {
 };
 
 /// R, G and B of every pixel, which belong to `primaries` (none: sRGB's), in linear sRGB; nothing when they
-/// are missing or the primaries are unknown.
+/// are missing or the primaries span no colours.
 std::optional<std::vector<float>> linearSrgb(const Image& image,
                                              const std::optional<std::array<double, 8>>& primaries);
 

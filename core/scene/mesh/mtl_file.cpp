@@ -87,7 +87,9 @@ const std::vector<MtlKey>& mtlKeys() {
          "image",
          "A texture that replaces `Kd`, on faces with `vt`: sRGB for 8 and 16 bits. "
          "Looked up in the folder of the MTL, with `/` for `\\`, without its folders, and in another letter "
-         "case. `-s`, `-o` and `-clamp` are read. If the file cannot be read, crt warns and uses `Kd`; a "
+         "case. `-s`, `-o` and `-clamp` are read; other options that change the picture, such as `-mm`, "
+         "bring a "
+         "warning. If the file cannot be read, crt warns and uses `Kd`; a "
          "black `Kd`, which exporters write together with a texture, counts as grey 0.6."},
         {"map_Ka", {}, "image", "Ignored, as `Ka`."},
         {"map_Ks", {}, "image", "Left out, with a warning."},

@@ -119,7 +119,10 @@ private:
         if (s == nullptr) return std::nullopt;
         std::string_view rest = s->arguments;
         std::string_view field = nextField(rest);
-        if (field == "-halo") field = nextField(rest);  // d -halo factor: opacity that depends on the angle.
+        if (field == "-halo") {  // d -halo factor: opacity that depends on the angle.
+            summary_.notApplied(mtl_, fmt::format("{} -halo", keyword));
+            field = nextField(rest);
+        }
         const std::optional<double> value = numberOf(field);
         if (value && std::isfinite(*value)) return value;
         summary_.unreadable(mtl_, keyword);
@@ -263,6 +266,50 @@ private:
 
     // ---- Images ----
 
+    /// Takes the numbers that follow an option off the front, and returns those that the option does not
+    /// give.
+    static std::vector<double> takeNumbers(std::string_view& rest, std::vector<double> defaults) {
+        for (double& number : defaults) {
+            std::string_view behind = rest;
+            const std::optional<double> value = numberOf(nextField(behind));
+            if (!value) break;
+            number = *value;
+            rest = behind;
+        }
+        return defaults;
+    }
+
+    /// An option of an image's statement, whose arguments are taken off the front. False if it would change
+    /// the picture and is not applied.
+    static bool option(std::string_view keyword, std::string_view name, std::string_view& rest,
+                       MtlMap& map) {
+        if (name == "-s" || name == "-o") {
+            constexpr double kMost = 1e6;
+            const double normal = name == "-s" ? 1 : 0;
+            bool applied = true;
+            const std::vector<double> values = takeNumbers(rest, {normal, normal, normal});
+            for (std::size_t k = 0; k < 2; ++k) {  // Images have no third coordinate.
+                const bool usable = std::abs(values[k]) <= kMost;
+                if (usable) map.transform[name == "-s" ? 4 * k : 2 + 3 * k] = values[k];
+                applied = applied && usable;
+            }
+            return applied;
+        }
+        if (name == "-t") return takeNumbers(rest, {0, 0, 0}) == std::vector<double>{0, 0, 0};
+        if (name == "-mm") return takeNumbers(rest, {0, 1}) == std::vector<double>{0, 1};
+        if (name == "-boost") return takeNumbers(rest, {0}) == std::vector<double>{0};
+        // The strength of bumps, which colours do not have.
+        if (name == "-bm") return takeNumbers(rest, {1}) == std::vector<double>{1} || keyword != "norm";
+        const std::string_view value = nextField(rest);
+        if (name == "-clamp") map.clamp = value == "on";
+        if (name == "-imfchan" && keyword == "map_d") {
+            map.channel = channelOf(value);
+            return value == "r" || value == "g" || value == "b" || value == "m";
+        }
+        if (name == "-blendu" || name == "-blendv") return value == "on";
+        return name == "-clamp" || (name == "-cc" && value == "off");
+    }
+
     /// Options and the name of a file, which may have blanks. Nothing, and noted, where it is not there.
     std::optional<MtlMap> map(const char* keyword) const {
         const MtlStatement& statement = *mtl_.find(keyword);
@@ -271,26 +318,10 @@ private:
         std::string_view rest = statement.arguments;
         for (;;) {
             std::string_view after = rest;
-            const std::string_view option = nextField(after);
-            if (option.empty() || option[0] != '-') break;
-            if (option == "-s" || option == "-o" || option == "-t") {
-                for (std::size_t k = 0; k < 3; ++k) {
-                    std::string_view behind = after;
-                    const std::optional<double> value = numberOf(nextField(behind));
-                    if (!value) break;
-                    after = behind;
-                    constexpr double kMost = 1e6;
-                    if (k == 2 || option == "-t" || !(std::abs(*value) <= kMost)) continue;
-                    map.transform[option == "-s" ? 4 * k : 2 + 3 * k] = *value;
-                }
-            } else {
-                const int arguments = option == "-mm" ? 2 : 1;
-                for (int i = 0; i < arguments; ++i) {
-                    const std::string_view value = nextField(after);
-                    if (option == "-clamp") map.clamp = value == "on";
-                    if (option == "-imfchan") map.channel = channelOf(value);
-                }
-            }
+            const std::string_view name = nextField(after);
+            if (name.empty() || name[0] != '-') break;
+            if (!option(keyword, name, after, map))
+                summary_.notApplied(mtl_, fmt::format("{} {}", keyword, name.substr(0, 40)));
             rest = after;
         }
         std::string name(trimmed(rest));
@@ -298,7 +329,9 @@ private:
             name = name.substr(1, name.size() - 2);
         const std::optional<std::string> file = findMap(name, mtl_.file);
         if (!file) {
-            if (!name.empty()) {
+            if (name.empty()) {
+                if (!statement.arguments.empty()) summary_.unreadable(mtl_, keyword);
+            } else {
                 summary_.dropped(keyword);
                 summary_.notThere(name);
             }
@@ -341,11 +374,19 @@ private:
 
 }  // namespace
 
-void MtlSummary::unreadable(const MtlText& material, const std::string& what) {
+void MtlSummary::note(const MtlText& material, const std::string& what, Places& to) {
     const MtlStatement* statement = material.find(what.substr(0, what.find(' ')));
-    if (++unreadable_[what] == 1)
-        unreadable_at_[what] =
+    Noted& noted = to[what];
+    if (++noted.count == 1)
+        noted.first =
             fmt::format("{}:{}", std::filesystem::path(material.file).filename().string(), statement->line);
+}
+
+std::string MtlSummary::list(const Places& places) {
+    std::vector<std::string> words;
+    for (const auto& [what, noted] : places)
+        words.push_back(fmt::format("{} ({}, first at {})", what, noted.count, noted.first));
+    return fmt::format("{}", fmt::join(words, " "));
 }
 
 /// The most frequent first: "Ks (20), map_Kd (18)".
@@ -384,9 +425,8 @@ std::string MtlSummary::text() const {
         text += fmt::format("; {} images do not exist, such as {}", not_there_.size(),
                             inQuotes(*not_there_.begin()));
     if (!unknown_.empty()) text += "; unknown: " + list(unknown_);
-    if (!unreadable_.empty()) text += "; not understood:";
-    for (const auto& [what, n] : unreadable_)
-        text += fmt::format(" {} ({}, first at {})", what, n, unreadable_at_.at(what));
+    if (!not_applied_.empty()) text += "; not applied: " + list(not_applied_);
+    if (!unreadable_.empty()) text += "; not understood: " + list(unreadable_);
     return text;
 }
 

@@ -49,23 +49,34 @@ public:
     /// A keyword that crt does not know.
     void unknown(const std::string& keyword) { ++unknown_[keyword]; }
     /// A statement without the numbers that it needs; `what` begins with its keyword.
-    void unreadable(const MtlText& material, const std::string& what);
+    void unreadable(const MtlText& material, const std::string& what) { note(material, what, unreadable_); }
+    /// An option of a keyword, such as "map_Kd -mm", that would be seen and that crt does not apply.
+    void notApplied(const MtlText& material, const std::string& what) { note(material, what, not_applied_); }
 
     bool empty() const { return kinds_.empty(); }
     /// True if anything differs from the file.
     bool lossy() const {
-        return !(decisions_.empty() && dropped_.empty() && unknown_.empty() && unreadable_.empty());
+        return !(decisions_.empty() && dropped_.empty() && unknown_.empty() && unreadable_.empty() &&
+                 not_applied_.empty());
     }
     /// "25 materials: 22 diffuse, 3 glass; dropped: Ks (20), map_Kd (18)"
     std::string text() const;
 
 private:
     using Counts = std::map<std::string, int>;
+    /// The number of statements, and the place of the first.
+    struct Noted {
+        int count = 0;
+        std::string first;
+    };
+    using Places = std::map<std::string, Noted>;
     static std::string list(const Counts& counts);
+    static std::string list(const Places& places);
+    static void note(const MtlText& material, const std::string& what, Places& to);
 
-    Counts kinds_, decisions_, dropped_, unknown_, unreadable_;
+    Counts kinds_, decisions_, dropped_, unknown_;
+    Places unreadable_, not_applied_;
     std::set<std::string> not_there_;
-    std::map<std::string, std::string> unreadable_at_;  ///< By the keys of `unreadable_`: the first.
 };
 
 /// A material of an MTL file as one of ours, by these rules, the first that fits (in full: mtlKeys()):

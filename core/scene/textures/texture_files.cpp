@@ -318,8 +318,10 @@ std::shared_ptr<const TextureImage> TextureFiles::open(const ImageSource& source
 std::shared_ptr<const TextureImage> TextureFiles::make(const ImageSource& source, const TexelUse& use) {
     const std::string& path = source.name;
     const TexelsInfo info = texelsInfo(source);
-    const bool encoded = use.kind == TexelKind::Spectra && use.color != TexelColor::Linear;
-    for (const std::string& sentence : sentencesOf(info.tags, path, encoded))
+    const PixelUse pixels = use.kind != TexelKind::Spectra    ? PixelUse::Numbers
+                            : use.color == TexelColor::Linear ? PixelUse::LinearColors
+                                                              : PixelUse::EncodedColors;
+    for (const std::string& sentence : sentencesOf(info.tags, path, pixels))
         if (told_.insert(sentence).second) logWarning("{}", sentence);
     if (use.kind == TexelKind::Spectra) (void)primariesToSrgb(info, path);  // refuses those it does not know
     if (use.kind == TexelKind::Normals && info.channels != 3)

@@ -57,9 +57,10 @@ void addTextures(std::vector<SectionSchema>& all) {
            .required = true,
            .doc = "A PNG, JPEG, TGA, EXR, Radiance HDR or PFM, by content; looked up in the scene's folder, "
                   "then in CRT_MESH_PATH. Or a glTF file or GLB, with `image`. Colours of an EXR with "
-                  "alpha, which are multiplied by it, are divided by it. EXPOSURE of an HDR, gAMA of a PNG "
-                  "and the EXIF orientation of a JPEG are ignored, with a warning where they would change "
-                  "the picture."},
+                  "alpha, which are multiplied by it, are divided by it. The primaries of an EXR and of an "
+                  "HDR are converted to those of sRGB. Ignored, with a warning where they would change the "
+                  "picture: EXPOSURE and COLORCORR of an HDR, gAMA, cHRM and cICP of a PNG, ICC profiles "
+                  "and the EXIF orientation of PNG and JPEG."},
           {.name = "image",
            .kind = Kind::Integer,
            .range = {0, 1e9, false, false},

@@ -4,6 +4,7 @@
 #include "base/modules.h"
 #include "scene/yaml/scene_hints.h"
 #include "spectra/data_catalogue.h"
+#include "spectra/spectrum_file.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -221,6 +222,10 @@ std::optional<Spectrum> SpectrumReader::table(const SectionReader& form) {
         if (nm[i] > nm[i - 1]) continue;
         out_.error(columns->list("nm")->items[i]->place,
                    fmt::format("wavelengths must increase, but {} nm follows {} nm", nm[i], nm[i - 1]));
+        return std::nullopt;
+    }
+    if (const std::string why = refusalOfUnit(nm.front(), nm.back()); !why.empty()) {
+        columns->error("nm", why);
         return std::nullopt;
     }
     const bool covered = nm.front() <= kWavelengthMin_nm && nm.back() >= kWavelengthMax_nm;

@@ -70,10 +70,10 @@ class Importer:
         if not (1 <= width <= 65535 and 1 <= height <= 65535 and width * height < 2**31):
             refuse(film.place, f"an image of {width} x {height} pixels; crt has 1 to 65535 a side")
         self.scene.film = {"resolution": [width, height]}
-        bounds, window = film.array("pixelbounds"), film.array("cropwindow")
-        if bounds is not None and len(bounds) == 4:
+        bounds, window = film.array("pixelbounds", count=4), film.array("cropwindow", count=4)
+        if bounds is not None:
             self.crop(film, *(int(v) for v in bounds[[0, 2, 1, 3]]))
-        elif window is not None and len(window) == 4:
+        elif window is not None:
             x0, x1, y0, y1 = np.clip(window, 0, 1) * [width, width, height, height]
             self.crop(film, *(math.ceil(v) for v in (x0, y0, x1, y1)))
         if film.string("sensor", "cie1931") != "cie1931":
@@ -145,8 +145,8 @@ class Importer:
         if not 0 < aspect < np.inf:
             refuse(found.place, f"'frameaspectratio' is {aspect:g}, and a frame has a width and a height")
         half = [aspect, 1.0] if aspect > 1 else [1.0, 1 / aspect]
-        window = found.array("screenwindow")
-        if window is not None and len(window) == 4:
+        window = found.array("screenwindow", count=4)
+        if window is not None:
             half = [(window[1] - window[0]) / 2, (window[3] - window[2]) / 2]
             if not (half[0] > 0 and half[1] > 0):
                 refuse(found.place, f"'screenwindow' is empty: {', '.join(f'{x:g}' for x in window)}")

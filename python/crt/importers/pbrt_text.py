@@ -15,6 +15,13 @@ TYPES = {"float": 1, "integer": 1, "point2": 2, "vector2": 2, "point3": 3, "vect
          "bool": None, "string": None, "texture": None, "xyz": 3}
 
 
+def only(values, place, what):
+    """The value of a list that has no other."""
+    if len(values) != 1:
+        refuse(place, f"{what}, not {len(values)}")
+    return values[0]
+
+
 class Text:
     """The tokens of a file, one after the other: (text, quoted?, offset)."""
 
@@ -174,10 +181,13 @@ class Parameters:
         self.left.discard(name)
         return self.values.get(name)
 
-    def array(self, name, columns=None):
+    def array(self, name, columns=None, count=None):
+        """None where it is not there. `columns` make rows, whose number is free; `count` is all of them."""
         found = self.raw(name)
         if found is None or not isinstance(found[1], np.ndarray):
             return None
+        if count and len(found[1]) != count:
+            refuse(found[2], f"'{name}' of {self} is {count} numbers, not {len(found[1])}")
         if columns and len(found[1]) % columns:
             refuse(found[2], f"'{name}' has {len(found[1])} numbers, which do not make rows of {columns}")
         return found[1].reshape(-1, columns) if columns else found[1]
@@ -186,22 +196,22 @@ class Parameters:
         found = self.raw(name)
         if found is None:
             return float(default)
-        if not isinstance(found[1], np.ndarray) or not len(found[1]):
+        if not isinstance(found[1], np.ndarray):
             refuse(found[2], f"'{name}' of {self} is a number")
-        return float(found[1][0])
+        return float(only(found[1], found[2], f"'{name}' of {self} is one number"))
 
     def string(self, name, default=None):
         found = self.raw(name)
         if found is None:
             return default
-        if isinstance(found[1], np.ndarray) or not found[1]:
+        if isinstance(found[1], np.ndarray):
             refuse(found[2], f"'{name}' of {self} is a text")
-        return found[1][0]
+        return only(found[1], found[2], f"'{name}' of {self} is one text")
 
     def boolean(self, name, default):
         found = self.string(name, default)
         return found if isinstance(found, bool) else found == "true"
 
     def point(self, name, default):
-        found = self.array(name)
-        return np.array(default, float) if found is None or len(found) < 3 else found[:3]
+        found = self.array(name, count=3)
+        return np.array(default, float) if found is None else found

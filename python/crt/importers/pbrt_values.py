@@ -8,7 +8,7 @@ from . import spectra
 from .losses import absence, present, refuse, step, suggestion
 from .images import BYTES, IMAGES, pixels
 from .mitsuba_values import decoded
-from .pbrt_text import TYPES
+from .pbrt_text import TYPES, only
 
 GLASSES = {"BK7": "N-BK7", "F10": "SF10", "F11": "SF11"}
 # Indices at 587.6 nm and Abbe's numbers of the catalogue.
@@ -69,7 +69,7 @@ class Values:
             if len(values) % 2 or values[::2].min() <= 0:
                 refuse(place, f"'{name}' is pairs of wavelength and value, not {len(values)} numbers")
             return spectra.table(values[::2], values[1::2], outside)
-        return self.named(values[0], place, outside)
+        return self.named(only(values, place, f"'{name}' of {parameters} is one spectrum"), place, outside)
 
     def named(self, name, place, outside):
         family, _, rest = name.partition("-")
@@ -135,11 +135,15 @@ class Values:
     def reflectance(self, parameters, name, default):
         if not parameters.has(name):
             return default
-        kind, values, place = parameters.raw(name)
-        if kind == "texture":
-            return self.texture("spectrum", values[0] if values else "", place)
+        if parameters.raw(name)[0] == "texture":
+            return self.named_texture(parameters, name, "spectrum")
         made = self.form(parameters, name, "zero")
         return default if made is None else bounded(made)
+
+    def named_texture(self, parameters, name, kind, depth=0):
+        _, values, place = parameters.raw(name)
+        wanted = only(values, place, f"'{name}' of {parameters} is one texture")
+        return self.texture(kind, wanted, place, depth)
 
     def number(self, parameters, name, default):
         """A number, or a texture of numbers."""
@@ -147,8 +151,12 @@ class Values:
             return default
         kind, values, place = parameters.raw(name)
         if kind == "texture":
-            return self.texture("float", values[0] if values else "", place)
-        if isinstance(values, np.ndarray) and len(values):
+            return self.named_texture(parameters, name, "float")
+        if kind in ("float", "integer") or (isinstance(values, np.ndarray) and len(values) == 1):
+            return parameters.number(name, default)
+        if kind in ("rgb", "color") and len(values) == 3:
+            if np.any(values != values[0]):
+                self.losses.add(place, f"a colour as '{name}' of {parameters}", "its mean")
             return float(np.mean(values))
         self.losses.add(place, f"'{name}' of {parameters}", f"{default}")
         return default
@@ -184,14 +192,11 @@ class Values:
         """A parameter of a texture."""
         if not found.has(name):
             return default
-        form, values, place = found.raw(name)
+        form = found.raw(name)[0]
         if form == "texture":
-            return self.texture(kind, values[0] if values else "", place, depth)
+            return self.named_texture(found, name, kind, depth)
         if kind == "float":
-            number = found.number(name, default)
-            if len(values) > 1:
-                self.losses.add(place, f"'{name}' of {found} with {len(values)} numbers", "the first number")
-            return number
+            return found.number(name, default)
         made = self.form(found, name, "zero")
         return default if made is None else bounded(made)
 
