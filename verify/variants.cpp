@@ -269,6 +269,7 @@ void forEachVariant(Context& context, int resolution, void (*ask)(Context&, cons
 Film portableFilm(const Scene& scene, const Render& how) {
     const CompiledScene compiled = compileScene(scene, how.aovs);
     Film film(filmShapeOf(compiled));
+    film.samples.add({how.first_sample, how.first_sample + how.samples});
     kernel::CrtContext context{};
     context.blob = compiled.data();
     context.scene = reinterpret_cast<const kernel::CrtScene*>(compiled.data());
@@ -278,7 +279,8 @@ Film portableFilm(const Scene& scene, const Render& how) {
             kernel::crt_render_pixel(&context, x, y, how.first_sample,
                                      static_cast<std::uint32_t>(how.samples), film.sums.data(),
                                      reinterpret_cast<kernel::u64*>(film.counts.data()),
-                                     film.primitives.empty() ? nullptr : film.primitives.data(), &rays);
+                                     film.primitives.empty() ? nullptr : film.primitives.data(),
+                                     film.splats.empty() ? nullptr : film.splats.data(), &rays);
         }
     return film;
 }
