@@ -17,6 +17,7 @@
 #define CRT_INTEGRATOR_LIST(I)                                  \
     I(1, NORMALS, Normals, "normals", normals, VIEW, 0, 1, 0)   \
     I(2, AABB, Aabb, "aabb", aabb, VIEW, 0, 0, 0)               \
+    I(3, SPLAT_TEST, SplatTest, "splat_test", splat_test, SPLAT, 1, 1, 1) \
     I(0, PATH, Path, "path", path, ALL, 1, 1, 0)
 
 #define CRT_INTEGRATOR_ENUM(number, NAME, Name, word, stem, KERNELS, light, surfaces, splats) \

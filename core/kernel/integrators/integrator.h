@@ -6,12 +6,14 @@
 #define CRT_INTEGRATOR_H
 
 #include "kernel/integrators/path.h"
+#include "kernel/integrators/splat_test.h"
 #include "kernel/integrators/views.h"
 
 CRT_KERNEL_BEGIN
 
 /* True if the scene's integrator is the row's, which is among those of such kernels. */
 #define CRT_CHOOSES_ALL(number) 1
+#define CRT_CHOOSES_SPLAT(number) (CRT_HAS(SPLAT) && ctx->scene->integrator == number)
 #define CRT_CHOOSES_VIEW(number) (CRT_HAS(VIEW) && ctx->scene->integrator == number)
 
 #define CRT_ROW_ADVANCES(number, NAME, Name, word, stem, KERNELS, light, surfaces, splats) \
