@@ -251,6 +251,7 @@ std::vector<Variant> variants(int resolution) {
     add("a spectral film", [](Scene& s) {
         s.film.spectral = {{380, 780, 16}, {{"flint", flint()}, {"flat", constantSpectrum(1)}}, false};
     });
+    add("splats on random pixels", [](Scene& s) { s.integrator.type = IntegratorType::SplatTest; });
     add("view of the normals", [](Scene& s) { s.integrator.type = IntegratorType::Normals; });
     add("view of the boxes", [](Scene& s) { s.integrator.type = IntegratorType::Aabb; });
     return all;
