@@ -187,6 +187,39 @@ TEST_CASE("set_scene clears the film, render adds, the report counts", "[abi]") 
     CHECK(raw.progress_calls > 0);
 }
 
+TEST_CASE("rectangles splat onto the whole film, in any order", "[abi]") {
+    Raw raw;
+    REQUIRE(raw.created == CRT_OK);
+    crt::Scene scene = sceneFrom(kScene);
+    scene.integrator.type = crt::IntegratorType::SplatTest;
+    const crt::CompiledScene compiled = crt::compileScene(scene, 0);
+    const std::size_t words = crt::kernel::crt_splat_words(&compiled.header());
+    REQUIRE(words > 0);
+    struct Rectangle {
+        std::uint32_t x0, y0, x1, y1;
+        std::uint64_t first, count;
+    };
+    const auto splatsOf = [&](const std::vector<Rectangle>& rectangles) {
+        Target target(compiled);
+        REQUIRE(raw.setScene(compiled) == CRT_OK);
+        for (const Rectangle& r : rectangles)
+            REQUIRE(raw.render(r.x0, r.y0, r.x1, r.y1, r.first, r.count) == CRT_OK);
+        CHECK(raw.integrator.read_film(raw.integrator.state, &target.view) == CRT_INVALID_ARGUMENT);
+        std::vector<std::uint64_t> splats(16 * 12 * words);
+        target.view.splats = splats.data();
+        REQUIRE(raw.integrator.read_film(raw.integrator.state, &target.view) == CRT_OK);
+        return splats;
+    };
+    const std::vector<std::uint64_t> whole = splatsOf({{0, 0, 16, 12, 0, 8}});
+    CHECK(splatsOf({{5, 3, 16, 12, 2, 6}, {0, 0, 16, 3, 0, 8}, {5, 3, 16, 12, 0, 2}, {0, 3, 5, 12, 0, 8}}) ==
+          whole);
+    // The samples of one row reach others.
+    const std::vector<std::uint64_t> row = splatsOf({{0, 0, 16, 1, 0, 8}});
+    CHECK(std::any_of(row.begin() + static_cast<std::ptrdiff_t>(16 * words), row.end(),
+                      [](std::uint64_t word) { return word != 0; }));
+    CHECK(row != whole);
+}
+
 TEST_CASE("a host that cancels gets CRT_CANCELLED soon", "[abi]") {
     Raw raw;
     REQUIRE(raw.created == CRT_OK);

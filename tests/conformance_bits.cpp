@@ -547,6 +547,10 @@ const Case kCases[] = {
      .more = kPointLights, .textured = true, .brushed = true, .shaped = true, .instanced = true},
     {.integrator = "{max_depth: 6}", .sampler = "{type: xorshift}", .camera_extra = "", .filter = "box",
      .composed = true, .mapped = true, .instanced = true},
+    {.integrator = "{type: splat_test}", .sampler = "{type: independent}", .camera_extra = "",
+     .filter = "box"},
+    {.integrator = "{type: splat_test, accelerator: bvh}", .sampler = "{type: sobol, replicates: 8}",
+     .camera_extra = "", .filter = "box", .textured = true},
 };
 
 constexpr std::uint32_t kAllAovs = crt::kAovsOfFirstHits;
@@ -639,7 +643,9 @@ std::vector<Named> allScenes() {
                                  "shapes, normal maps, boxes, xorshift",
                                  "instances, glassware, sampled environment",
                                  "instances, shapes, textures, brushed, independent",
-                                 "instances, mixes and holes, normal maps, xorshift"};
+                                 "instances, mixes and holes, normal maps, xorshift",
+                                 "splats",
+                                 "splats, eight replicates, tree, sobol"};
     static_assert(std::size(names) == std::size(kCases));
     std::vector<Named> all;
     for (std::size_t i = 0; i < std::size(kCases); ++i) all.push_back({names[i], sceneOf(kCases[i])});
@@ -662,6 +668,9 @@ std::string hashOf(const crt::Film& film) {
             values.push_back(static_cast<double>(film.counts[pixel]));
             if (!film.primitives.empty()) values.push_back(film.primitives[pixel]);
         }
+    for (const std::uint64_t word : film.splats)  // In halves, which a double holds.
+        for (const std::uint64_t half : {word >> 32, word & 0xffffffff})
+            values.push_back(static_cast<double>(half));
     const XXH128_hash_t hash = XXH3_128bits(values.data(), values.size() * sizeof values[0]);
     return fmt::format("{:016x}{:016x}", hash.high64, hash.low64);
 }

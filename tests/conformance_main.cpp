@@ -88,6 +88,8 @@ std::uint64_t differingPixels(const crt::Film& a, const crt::Film& b, bool all) 
                         (a.primitives.empty() || a.primitives[pixel] == b.primitives[pixel]);
             for (std::uint32_t c = 0; c < channels; ++c)
                 same = same && static_cast<float>(a.mean(x, y, c)) == static_cast<float>(b.mean(x, y, c));
+            for (std::size_t w = 0, words = a.shape().splatWords(); w < words; ++w)
+                same = same && a.splats[pixel * words + w] == b.splats[pixel * words + w];
             differing += same ? 0 : 1;
         }
     return differing;

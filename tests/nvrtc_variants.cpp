@@ -91,6 +91,7 @@ std::map<std::uint64_t, std::string> representativeMasks() {
              CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_LENS | CRT_FEATURE_FILTER,
          "all materials, BVH"},
         {CRT_FEATURE_SOBOL | CRT_FEATURE_BVH | CRT_FEATURE_VIEW, "a view of normals"},
+        {sobol | CRT_FEATURE_SPLAT, "splats"},
     };
 }
 

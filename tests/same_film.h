@@ -11,6 +11,7 @@ inline void checkSame(const Film& film, const Film& expected) {
     CHECK(film.sums == expected.sums);
     CHECK(film.counts == expected.counts);
     CHECK(film.primitives == expected.primitives);
+    CHECK(film.splats == expected.splats);
 }
 
 }  // namespace crt::test

@@ -384,7 +384,7 @@ TEST_CASE("what is wrong with a checkpoint is said", "[checkpoint]") {
     };
     CHECK_THROWS_WITH(
         readCheckpoint(with(8, 9)),
-        Contains("format 9") && Contains("reads formats 2 and " + std::to_string(kCheckpointVersion)));
+        Contains("format 9") && Contains("reads formats 2 to " + std::to_string(kCheckpointVersionSplats)));
     CHECK_THROWS_WITH(readCheckpoint(with(0, 'x')), Contains("not a crt film"));
     CHECK_THROWS_WITH(readCheckpoint(with(35, 0x7f)),
                       Contains("damaged: its header"));  // Two thousand million pixels wide.

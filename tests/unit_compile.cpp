@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <map>
 #include <set>
 #include <string>
@@ -249,6 +250,8 @@ TEST_CASE("every feature bit is set by some scene, and by nothing else", "[compi
         differs(CRT_FEATURE_VIEW, light, [](Scene& s) { s.integrator.type = crt::IntegratorType::Normals; });
     seen |= differs(CRT_FEATURE_VIEW, light | CRT_FEATURE_BRUTE_FORCE,
                     [](Scene& s) { s.integrator.type = crt::IntegratorType::Aabb; });
+    seen |= differs(CRT_FEATURE_SPLAT, 0,
+                    [](Scene& s) { s.integrator.type = crt::IntegratorType::SplatTest; });
     const auto many = [](Scene& s) {  // each quad in a separate place
         s.objects[1].transforms.resize(crt::kLightTreeLights, crt::kIdentity4d);
         for (std::size_t i = 0; i < crt::kLightTreeLights; ++i)
@@ -389,4 +392,22 @@ TEST_CASE("what is left out is listed with a reason, and what is needed is not",
         CHECK_FALSE(listed(full, what));
     }
     CHECK(listed(full, "light sampling and shadow rays"));  // glass alone cannot be lit by it
+}
+
+TEST_CASE("the unit of splats is a power of two that follows the power of the lights", "[compile]") {
+    CHECK(compiled(litFloor()).header().splat_scale == 0);
+    Scene scene = litFloor();
+    scene.integrator.type = crt::IntegratorType::SplatTest;
+    const crt::CompiledScene once = compiled(scene);
+    const double scale = once.header().splat_scale;
+    int exponent = 0;
+    CHECK(std::frexp(scale, &exponent) == 0.5);
+    CHECK((once.header().aovs & CRT_AOV_SPLATS) != 0);
+    for (double& value : scene.emissions[0].radiance.values) value *= 8;
+    CHECK(compiled(scene).header().splat_scale == scale / 8);
+    CHECK(compiled(scene).hash != once.hash);
+    for (double& value : scene.emissions[0].radiance.values) value = 0;
+    CHECK(compiled(scene).header().splat_scale == std::ldexp(1.0, 32));
+    scene.film.spectral.bins = {400, 700, 30};
+    CHECK_THROWS_WITH(compiled(scene), Contains("splat_test") && Contains("film.spectral"));
 }

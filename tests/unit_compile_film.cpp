@@ -329,6 +329,7 @@ TEST_CASE("the bits of AOVs never change: film files hold them", "[compile]") {
         seen |= row.aov;
     }
     CHECK(crt::kAovSquares == 256);
-    CHECK(seen == 511);
+    CHECK(crt::kAovSplats == 512);
+    CHECK(seen == 1023);
     CHECK(crt::kAovsOfFirstHits == 15);
 }

@@ -212,3 +212,18 @@ TEST_CASE("in bands, chunks grow until what each costs besides does not count", 
     CHECK(result.chunks == 4);  // 1 + 8 + 64 + 512
     checkSame(film, filmOfOne(585));
 }
+
+TEST_CASE("a film with splats is not rendered in bands", "[device_film]") {
+    const LoadedBackend backend = loadBackend(CRT_FAKE_PLUGIN_DIR "/crt_backend_fake.so");
+    CompiledScene compiled = compileScene(
+        parseScene("crt: 1\nfilm: {resolution: [12, 20]}\nenvironment: {radiance: 1}\n"
+                   "integrator: {type: splat_test}\n",
+                   "test", "."),
+        0);
+    DeviceGroup group(backend, {}, probeDevices(backend));
+    DeviceFilm devices(group, compiled);
+    const Setting memory("CRT_FAKE_MEMORY", std::to_string(compiled.size_bytes + 1000));
+    CHECK_THROWS_WITH(devices.setScene(),
+                      Contains("the film needs") && Contains("cannot be rendered in bands"));
+    CHECK_FALSE(devices.inBands());
+}

@@ -96,7 +96,7 @@ TEST_CASE("a library that is no plugin of this version", "[loader]") {
                                          Contains("undefined symbol: crt_backend_v1"));
     CHECK_THAT(
         refusal("wrong_abi"),
-        Contains("has version 2.2 of the plugin interface and this crt has 1.2: rebuild the plugin"));
+        Contains("has version 2.3 of the plugin interface and this crt has 1.3: rebuild the plugin"));
     CHECK_THAT(refusal("no_table"), Contains("crt_backend_v1 returned no table"));
     CHECK_THAT(refusal("small_table"), Contains("its table has 32 bytes where version 1 needs " +
                                                 std::to_string(offsetof(CrtBackend, bits_version))));
@@ -184,7 +184,7 @@ TEST_CASE("the list of backends has the known ones, the found ones and every rea
     CHECK(list["fake"].reason.empty());
     CHECK(list["fake"].version == CRT_HEADERS_VERSION);
     CHECK(list["fake"].devices.size() == 2);
-    CHECK_THAT(list["wrong_abi"].reason, Contains("version 2.2"));
+    CHECK_THAT(list["wrong_abi"].reason, Contains("version 2.3"));
     CHECK_THAT(list["no_device"].reason, Contains("older than 1.2"));
     CHECK(list["no_device"].build == "an old compiler");
 }

@@ -65,7 +65,8 @@ struct Stack {
         std::vector<f64> sums(2 * ctx.scene->channels);
         u64 count = 0;
         CrtRayCount rays{0, 0};
-        crt_render_pixel(&ctx, 0, 0, 0, static_cast<u32>(samples), sums.data(), &count, nullptr, &rays);
+        crt_render_pixel(&ctx, 0, 0, 0, static_cast<u32>(samples), sums.data(), &count, nullptr, nullptr,
+                         &rays);
         return (sums[2] + sums[3]) / static_cast<double>(count);
     }
 };

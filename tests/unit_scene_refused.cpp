@@ -158,7 +158,7 @@ TEST_CASE("wrong types and impossible numbers", "[scene_yaml][refused]") {
                Contains("expected true or false for 'nee', found 'yes'") && Contains("write true"));
     CHECK_THAT(refused("integrator: {nee: 0}\n"), Contains("write false"));
     CHECK_THAT(refused("integrator: {type: pth}\n"),
-               Contains("expected one of path, normals, aabb for 'type', found 'pth'") &&
+               Contains("expected one of path, normals, aabb, splat_test for 'type', found 'pth'") &&
                    Contains("did you mean 'path'?"));
     CHECK_THAT(refused("sampler: {samples: 0}\n"), Contains("'samples' is 0; it must be 1 to"));
     CHECK_THAT(refused("sampler: {seed: -1}\n"), Contains("'seed' is -1; it must be 0 or more"));

@@ -92,7 +92,8 @@ TEST_CASE("the choices of the schema are in the order of the enumerations", "[sc
     all("integrator", "type",
         std::map<std::string, IntegratorType>{{"path", IntegratorType::Path},
                                               {"normals", IntegratorType::Normals},
-                                              {"aabb", IntegratorType::Aabb}},
+                                              {"aabb", IntegratorType::Aabb},
+                                              {"splat_test", IntegratorType::SplatTest}},
         [](const std::string& name) { return parse("integrator: {type: " + name + "}").integrator.type; });
     all("integrator", "accelerator",
         std::map<std::string, Accelerator>{{"auto", Accelerator::Auto},

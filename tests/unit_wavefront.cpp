@@ -21,6 +21,7 @@ TEST_CASE("waves are for several kinds of material in a tree, and for long ones"
         CHECK(wantsWavefront(one | lengthy | CRT_FEATURE_BRUTE_FORCE, 16));
         // A view is no path.
         CHECK_FALSE(wantsWavefront(one | lengthy | CRT_FEATURE_VIEW, 16));
+        CHECK_FALSE(wantsWavefront(one | lengthy | CRT_FEATURE_SPLAT, 16));
     }
     CHECK_FALSE(wantsWavefront(CRT_FEATURES_ALL, 16));
 }

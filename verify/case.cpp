@@ -78,8 +78,9 @@ const std::vector<Case>& registry() {
               stiffCases,      scatteringCases,    roughSurfaceCases,  glasswareCases,   paneCases,
               thinFilmCases,   anisotropyCases,    openPbrCases,       openPbrCoatCases, compositionCases,
               bodyCases,       shadingNormalCases, quadricCases,       instanceCases,    shapeLightCases,
-              colourCases,     textureCases,       accumulationCases,  cameraCases,      firstHitCases,
-              imageCases,      backendCases,       exactRelationCases, mutantCases,      contactCases})
+              colourCases,     textureCases,       accumulationCases,  splatCases,       cameraCases,
+              firstHitCases,   imageCases,         backendCases,       exactRelationCases, mutantCases,
+              contactCases})
             for (Case& c : group()) all.push_back(std::move(c));
         std::sort(all.begin(), all.end(), [](const Case& a, const Case& b) { return a.id < b.id; });
         return all;

@@ -115,6 +115,7 @@ std::vector<Case> shapeLightCases();     ///< G, lamps that are such
 std::vector<Case> colourCases();         ///< H
 std::vector<Case> textureCases();        ///< H, the part about textures
 std::vector<Case> accumulationCases();   ///< I
+std::vector<Case> splatCases();          ///< I, the part about splats
 std::vector<Case> cameraCases();         ///< J: lens and filter
 std::vector<Case> firstHitCases();       ///< D, J: the outputs of first hits
 std::vector<Case> imageCases();          ///< J

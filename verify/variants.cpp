@@ -251,6 +251,7 @@ std::vector<Variant> variants(int resolution) {
     add("a spectral film", [](Scene& s) {
         s.film.spectral = {{380, 780, 16}, {{"flint", flint()}, {"flat", constantSpectrum(1)}}, false};
     });
+    add("splats on random pixels", [](Scene& s) { s.integrator.type = IntegratorType::SplatTest; });
     add("view of the normals", [](Scene& s) { s.integrator.type = IntegratorType::Normals; });
     add("view of the boxes", [](Scene& s) { s.integrator.type = IntegratorType::Aabb; });
     return all;
@@ -269,6 +270,7 @@ void forEachVariant(Context& context, int resolution, void (*ask)(Context&, cons
 Film portableFilm(const Scene& scene, const Render& how) {
     const CompiledScene compiled = compileScene(scene, how.aovs);
     Film film(filmShapeOf(compiled));
+    film.samples.add({how.first_sample, how.first_sample + how.samples});
     kernel::CrtContext context{};
     context.blob = compiled.data();
     context.scene = reinterpret_cast<const kernel::CrtScene*>(compiled.data());
@@ -278,7 +280,8 @@ Film portableFilm(const Scene& scene, const Render& how) {
             kernel::crt_render_pixel(&context, x, y, how.first_sample,
                                      static_cast<std::uint32_t>(how.samples), film.sums.data(),
                                      reinterpret_cast<kernel::u64*>(film.counts.data()),
-                                     film.primitives.empty() ? nullptr : film.primitives.data(), &rays);
+                                     film.primitives.empty() ? nullptr : film.primitives.data(),
+                                     film.splats.empty() ? nullptr : film.splats.data(), &rays);
         }
     return film;
 }

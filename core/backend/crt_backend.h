@@ -25,8 +25,8 @@ extern "C" {
 #endif
 
 #define CRT_ABI_MAJOR 1
-#define CRT_ABI_MINOR 2 /* 1: CrtBackend::bits_version; 2: CrtBackend::brings, progress() during set_scene,
-                           CRT_KERNEL_LEAN_ONLY */
+#define CRT_ABI_MINOR 3 /* 1: CrtBackend::bits_version; 2: CrtBackend::brings, progress() during set_scene,
+                           CRT_KERNEL_LEAN_ONLY; 3: CrtFilmView::splats */
 
 /* The entry symbol carries the major version: a plugin of another major version simply does not have it. */
 #define CRT_BACKEND_ENTRY crt_backend_v1
@@ -122,7 +122,8 @@ typedef struct CrtRenderRange {
  * crop window. sums: [height][width][channels][2], each pair an unevaluated sum hi + lo of doubles (so that
  * order does not show). counts: [height][width], valid samples; an invalid (NaN or infinite) sample is
  * dropped and not counted. primitives: [height][width], primitive id at the first sample rendered,
- * 0xffffffff for none; null unless the scene requests it.
+ * 0xffffffff for none; null unless the scene requests it. splats: since 1.3; [height][width] pixels of
+ * CRT_SPLAT_WORDS words (kernel/dialect/channels.h); null unless the scene's aovs have CRT_AOV_SPLATS.
  */
 typedef struct CrtFilmView {
     uint32_t struct_size;
@@ -130,6 +131,7 @@ typedef struct CrtFilmView {
     double *sums;
     uint64_t *counts;
     uint32_t *primitives;
+    uint64_t *splats;
 } CrtFilmView;
 
 /* Report of the backend's work. Times in seconds; zero where it does not apply. */

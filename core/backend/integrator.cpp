@@ -238,6 +238,7 @@ struct Integrator::Impl {
         view.sums = film.sums.data();
         view.counts = film.counts.data();
         view.primitives = film.primitives.empty() ? nullptr : film.primitives.data();
+        view.splats = film.splats.empty() ? nullptr : film.splats.data();
         check(call("read_film", [&] { return table.read_film(table.state, &view); }));
         film.samples = samples;
         checkContents(film);
@@ -292,7 +293,8 @@ CompileOptions compileOptionsFor(const LoadedBackend& backend) {
 
 FilmShape filmShapeOf(const CompiledScene& compiled) {
     const kernel::CrtScene& header = compiled.header();
-    return {header.width, header.height, header.channels, header.aovs, compiled.spectral_channels};
+    return {header.width, header.height, header.channels, header.aovs, compiled.spectral_channels,
+            header.splat_scale};
 }
 
 void Integrator::setScene(const CompiledScene& scene, const std::function<void(double)>& progress) {
@@ -369,7 +371,7 @@ void Integrator::readFilm(Film& film) {
                     "the film holds part of a cancelled or failed range and cannot be read");
     const FilmShape &shape = film.shape(), &own = self.shape;
     if (shape.width != own.width || shape.height != own.height || shape.channels != own.channels ||
-        ((shape.aovs ^ own.aovs) & kAovPrimitive) != 0) {
+        ((shape.aovs ^ own.aovs) & (kAovPrimitive | kAovSplats)) != 0) {
         throw Error(ErrorKind::Internal, "readFilm got a film whose shape differs from the scene's");
     }
 

@@ -222,8 +222,12 @@ void showFilm(const std::string& file) {
     printRow("aovs", aovText(film.shape().aovs));
     printRow("samples", fmt::format("{} per pixel: {}", film.samples.count(), film.samples.text()));
     printRow("invalid", counted(film.invalidSamples(), "sample", "samples"));
+    if (!film.splats.empty()) printRow("dropped", counted(film.droppedSplats(), "splat", "splats"));
     const bool light_is_missing = identity.record && !identity.record->missing_light.empty();
-    printRow("error", error ? errorText(*error, light_is_missing).substr(6) : "unknown");
+    const bool lacks_replicates = !film.splats.empty() && film.replicates() == 1;
+    printRow("error", error              ? errorText(*error, light_is_missing).substr(6)
+                      : lacks_replicates ? "unknown: samples add to other pixels, without replicates"
+                                         : "unknown");
     if (identity.record) showRecord(*identity.record);
     printRow("scene hash", identity.scene_hash);
     printRow("written by", fmt::format("crt {}, bits version {}", identity.version, identity.bits_version));

@@ -143,6 +143,7 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
     header.tree_lights = lights.tree_lights;
     header.environment_light = lights.environment;
     header.point_lights = blob.append(lights.point_lights);
+    if (splats(scene.integrator.type)) header.splat_scale = splatScale(lights.power);
     if (lights.lights.empty() && !scene.environment && measuresLight(scene.integrator.type))
         logWarning(
             "the scene has no light: the image will be black "

@@ -248,6 +248,7 @@ LightPart compileLights(const Scene& scene, const FlatScene& flat,
                         brightness(own->spectrum));
         bounds.push_back(boundsOfPoint(*own, part.point_lights.back(), power.back()));
     }
+    part.power = std::accumulate(power.begin(), power.end(), 0.0);
     growTree(bounds, part, power);
     const std::vector<std::uint64_t> first = choiceTable(power);
     for (std::size_t i = 0; i < part.lights.size(); ++i) {

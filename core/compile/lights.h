@@ -27,6 +27,7 @@ struct LightPart {
     std::uint32_t tree_lights = 0;
     std::vector<kernel::CrtPointLight> point_lights;
     std::uint32_t emitters = 0;           ///< Lights that are triangles or parallelograms: the first ones.
+    double power = 0;  ///< Of all lights, in the units that they are chosen by.
 };
 /// `around`: the texels of an environment that has them, or null. The light of the environment has no
 /// radiance yet: its spectrum comes last in the table.

@@ -49,7 +49,8 @@ std::string sceneIdentity(const unsigned char* blob, const std::vector<std::arra
     const std::uint32_t bits_version = CRT_BITS_VERSION;
     hash.add(&bits_version, 1, sizeof bits_version);
     const CrtScene settings = settingsOf(header);
-    hash.add(&settings, 1, offsetof(CrtScene, patches));  // behind them there are places in the blob alone
+    hash.add(&settings, 1, offsetof(CrtScene, patches));  // behind them there are places in the blob, and:
+    if (settings.splat_scale != 0) hash.add(&settings.splat_scale, 1, sizeof settings.splat_scale);
     hash.add(positions.data(), positions.size(), sizeof positions[0]);
     hash.add(CRT_ARRAY(CrtPrimitive, blob, header.primitives), header.primitives.count,
              sizeof(CrtPrimitive));

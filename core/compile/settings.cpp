@@ -23,9 +23,19 @@ Vec3d normalise(const Vec3d& v) {
     return near_one * (1.0 / std::sqrt(dot(near_one, near_one)));
 }
 
-/// Contents of the film: the channels of first hits that outputs need, and those for its error.
+/// Contents of the film: the channels of first hits that outputs need, those for its error, and splats.
 std::uint32_t filmAovs(const Scene& scene, std::uint32_t aovs) {
-    return (aovs & kAovsOfFirstHits) | (replicatesOf(scene) > 1 ? kAovReplicates : kAovSquares);
+    return (aovs & kAovsOfFirstHits) | (replicatesOf(scene) > 1 ? kAovReplicates : kAovSquares) |
+           (splats(scene.integrator.type) ? std::uint32_t{kAovSplats} : 0);
+}
+
+/// Bins and responses are of a pixel's own samples.
+void requireNoSpectrum(const Scene& scene) {
+    if (splats(scene.integrator.type) && spectralChannelsOf(scene).count() > 0)
+        throw Error(ErrorKind::Scene,
+                    fmt::format("integrator.type {} adds samples to other pixels than their own, which "
+                                "film.spectral and film.responses cannot hold: remove them",
+                                rowOf(scene.integrator.type).word));
 }
 
 /// Channels and replicates.
@@ -133,9 +143,15 @@ void compileView(const Scene& scene, const Vec3d& centre, int scale_exponent, ke
     header.camera = cameraOf(scene, centre, scale_exponent);
 }
 
+double splatScale(double power) {
+    const bool is_known = std::isnormal(power) && power > 0;
+    return std::ldexp(1.0, 32 - std::clamp(is_known ? std::ilogb(power) : 0, -900, 900));
+}
+
 kernel::CrtScene compileSettings(const Scene& scene, const FlatScene& flat, std::uint32_t aovs) {
     kernel::CrtScene header{};
     header.magic = CRT_SCENE_MAGIC;
+    requireNoSpectrum(scene);
     setChannels(scene, filmAovs(scene, aovs), header);
     header.depth_scale = static_cast<float>(std::ldexp(1.0, -flat.scale_exponent));
     compileView(scene, flat.centre, flat.scale_exponent, header);

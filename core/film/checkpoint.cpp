@@ -61,13 +61,15 @@ void addHeader(ByteHash& checksum, const Header& header) {
     checksum.add(bytes + kAfterChecksum, sizeof(Header) - kAfterChecksum);
 }
 
-/// Sample ranges, version and record: the part of the header whose size varies.
+/// Sample ranges, version, record and scale of splats: the part of the header whose size varies.
 std::vector<unsigned char> packTail(const Film& film, const FilmIdentity& identity,
                                     const std::string& record) {
     const auto& ranges = film.samples.ranges();
     const std::size_t range_bytes = ranges.size() * 16;
     const std::size_t record_begin = range_bytes + roundUp8(identity.version.size());
-    std::vector<unsigned char> bytes(record_begin + roundUp8(record.size()), 0);
+    const std::size_t record_end = record_begin + roundUp8(record.size());
+    const double scale = film.shape().splat_scale;
+    std::vector<unsigned char> bytes(record_end + (scale != 0 ? sizeof scale : 0), 0);
     for (std::size_t i = 0; i < ranges.size(); ++i) {
         std::memcpy(&bytes[i * 16], &ranges[i].first, 8);
         std::memcpy(&bytes[i * 16 + 8], &ranges[i].second, 8);
@@ -75,6 +77,7 @@ std::vector<unsigned char> packTail(const Film& film, const FilmIdentity& identi
     if (!identity.version.empty())
         std::memcpy(&bytes[range_bytes], identity.version.data(), identity.version.size());
     if (!record.empty()) std::memcpy(&bytes[record_begin], record.data(), record.size());
+    if (scale != 0) std::memcpy(&bytes[record_end], &scale, sizeof scale);
     return bytes;
 }
 
@@ -111,8 +114,13 @@ bool isHexHash(const char* digits, std::size_t size) {
 using Wide = unsigned __int128;
 
 /// Sample ranges, version and record.
-std::uint64_t tailBytes(const Header& h) {
+std::uint64_t bytesToRecordEnd(const Header& h) {
     return h.range_count * std::uint64_t{16} + roundUp8(h.version_bytes) + roundUp8(h.record_bytes);
+}
+
+/// The same with the scale of splats.
+std::uint64_t tailBytes(const Header& h) {
+    return bytesToRecordEnd(h) + (h.format_version == kCheckpointVersionSplats ? sizeof(double) : 0);
 }
 
 /// Size of the part before the film.
@@ -122,7 +130,7 @@ Wide headBytes(const Header& h) { return Wide{tailBytes(h)} + sizeof(Header); }
 bool sizesFit(const Header& h) {
     if (h.header_bytes != headBytes(h)) return false;
     if (h.format_version > kCheckpointVersionUnpacked)
-        return h.file_bytes >= headBytes(h) + leastPackedBytes({h.width, h.height, h.channels, h.aovs, 0});
+        return h.file_bytes >= headBytes(h) + leastPackedBytes({h.width, h.height, h.channels, h.aovs});
     const Wide pixels = Wide{h.width} * h.height;
     const Wide ids = (h.aovs & kAovPrimitive) != 0 ? (pixels * 4 + 7) / 8 * 8 : 0;
     return h.record_bytes == 0 && h.file_bytes == headBytes(h) + pixels * h.channels * 16 + pixels * 8 + ids;
@@ -162,7 +170,7 @@ void writeCheckpoint(const std::string& path, const Film& film, const FilmIdenti
     const std::vector<unsigned char> tail = packTail(film, identity, record);
     Header header{};
     header.magic = kMagic;
-    header.format_version = kCheckpointVersion;
+    header.format_version = film.splats.empty() ? kCheckpointVersion : kCheckpointVersionSplats;
     header.header_bytes = static_cast<std::uint32_t>(sizeof(Header) + tail.size());
     header.width = film.shape().width;
     header.height = film.shape().height;
@@ -201,10 +209,11 @@ std::pair<Film, FilmIdentity> readCheckpoint(const std::string& path) {
     if (std::memcmp(header.magic.data(), kMagic.data(),
                     std::min<std::uint64_t>(actual_bytes, kMagic.size())) != 0)
         refuse(path, "is not a crt film: its first bytes differ");
-    if (actual_bytes >= 12 && header.format_version != kCheckpointVersion &&
-        header.format_version != kCheckpointVersionUnpacked)
-        refuse(path, fmt::format("is a crt film of format {}; this crt reads formats {} and {}",
-                                 header.format_version, kCheckpointVersionUnpacked, kCheckpointVersion));
+    if (actual_bytes >= 12 && (header.format_version < kCheckpointVersionUnpacked ||
+                               header.format_version > kCheckpointVersionSplats))
+        refuse(path, fmt::format("is a crt film of format {}; this crt reads formats {} to {}",
+                                 header.format_version, kCheckpointVersionUnpacked,
+                                 kCheckpointVersionSplats));
     if (actual_bytes < sizeof header)
         refuse(path, fmt::format("is truncated: it has {} bytes and its header needs {}", actual_bytes,
                                  sizeof header));
@@ -239,13 +248,16 @@ std::pair<Film, FilmIdentity> readCheckpoint(const std::string& path) {
     std::optional<FilmRecord> record;
     if (header.record_bytes > 0) record = readRecordOf(path, tail, header);
     const std::uint32_t spectral = record ? record->spectral.count() : 0;
+    double splat_scale = 0;
+    if (header.format_version == kCheckpointVersionSplats)
+        std::memcpy(&splat_scale, &tail[bytesToRecordEnd(header)], sizeof splat_scale);
 
     // The shape of an unpacked film is used before the checksum is known; Film refuses one that cannot be.
     const auto make_film = [&] {
         try {
             const bool squares = header.format_version == kCheckpointVersionUnpacked;
             return Film({header.width, header.height, header.channels,
-                         header.aovs | (squares ? kAovSquares : 0u), spectral});
+                         header.aovs | (squares ? kAovSquares : 0u), spectral, splat_scale});
         } catch (const Error& error) {
             if (error.kind() != ErrorKind::Internal) throw;  // Too large for this machine is not damaged.
             refuse(path, kBadChecksum);

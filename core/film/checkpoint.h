@@ -16,10 +16,14 @@
 ///     96  u64 × 2 each   sample ranges, first and end
 ///         char[]         crt version, zero-padded to 8
 ///         char[]         record (film_record.h), zero-padded to 8
+///         f64            in format 4 only: units of splats in 1 (CrtScene::splat_scale)
 ///         bytes          to the end of the file: the film, packed (film_pack.h). Its sections are
 ///             f64 × 2 each   sums, hi and lo, [height][width][channels]
 ///             u64 each       counts, [height][width]
 ///             u32 each       primitive ids, [height][width]; only when the AOV mask has them
+///             u64 each       splats, [height][width][words]; only in format 4
+///
+/// Films that take splats (kernel/film/splat.h) have format 4, all others format 3.
 ///
 /// Version 2, which is read still, has these sections as they are, the last zero-padded to 8 bytes, and no
 /// record; its films hold squares (kernel/dialect/channels.h) without a bit that says so.
@@ -50,6 +54,8 @@ void writeCheckpoint(const std::string& path, const Film& film, const FilmIdenti
 std::pair<Film, FilmIdentity> readCheckpoint(const std::string& path);
 
 inline constexpr std::uint32_t kCheckpointVersion = 3;
+/// Of films that take splats.
+inline constexpr std::uint32_t kCheckpointVersionSplats = 4;
 /// The last version whose films are not packed, and have no record.
 inline constexpr std::uint32_t kCheckpointVersionUnpacked = 2;
 inline constexpr const char* kCheckpointExtension = ".crtfilm";

@@ -181,6 +181,25 @@ double noisiestPath(const Film& film, const LuminanceVariance& variance, const P
     return most;
 }
 
+/// The same for the mean of all pixels, whatever they have in common: from the means of the replicates.
+double standardErrorOfMean(const Film& film, PixelSet which, double pixels) {
+    const auto n = static_cast<double>(film.samples.count());
+    std::vector<double> sums(film.replicates());
+    double total = 0, squares = 0;
+    for (std::uint32_t r = 0; r < film.replicates(); ++r) {
+        sums[r] = sumOverPixels<double>(film, [&](double& sum, std::uint32_t x, std::uint32_t y) {
+            if (belongs(x, y, which)) sum += film.replicateSum(x, y, r);
+        });
+        total += sums[r];
+    }
+    for (std::uint32_t r = 0; r < film.replicates(); ++r) {
+        const auto of_replicate = static_cast<double>(film.replicateSamples(r));
+        const double deviation = sums[r] - of_replicate / n * total;
+        squares += deviation * deviation / of_replicate;
+    }
+    return std::sqrt(squares / (film.replicates() - 1) / n) / pixels;
+}
+
 /// True if paths that the pixels of the set have not met yet may make their error larger than it seems.
 bool missesBrightPaths(const Film& film, const PixelMap& variances, PixelSet which, const VarianceSums& sums,
                        double unit, double degrees_of_freedom) {
@@ -199,7 +218,9 @@ bool missesBrightPaths(const Film& film, const PixelMap& variances, PixelSet whi
 LuminanceVariance::LuminanceVariance(const Film& film)
     : film_(film), from_replicates_(balanced(film)), squares_(firstChannel(film.shape().aovs, kAovSquares)) {
     if (!from_replicates_) {
-        dof_ = squares_ != 0 ? static_cast<double>(film.samples.count()) - 1 : 0;
+        // The splats of a pixel are those of all samples of the film: no square tells how they scatter.
+        const bool tells = squares_ != 0 && film.splats.empty();
+        dof_ = tells ? static_cast<double>(film.samples.count()) - 1 : 0;
         return;
     }
     for (std::uint32_t r = 0; r < film.replicates(); ++r)
@@ -211,7 +232,7 @@ LuminanceVariance::LuminanceVariance(const Film& film)
 /// − 1), and s²/n for the mean of all n samples. With equal n_r it is the variance of the R means over R.
 double LuminanceVariance::betweenReplicates(std::uint32_t x, std::uint32_t y) const {
     const auto n = static_cast<double>(film_.samples.count());
-    const double mean = film_.sum(x, y, 1) / n;
+    const double mean = film_.mean(x, y, 1);
     double squares = 0;
     for (std::uint32_t r = 0; r < film_.replicates(); ++r) {
         const double deviation = film_.replicateSum(x, y, r) - samples_[r] * mean;
@@ -222,10 +243,11 @@ double LuminanceVariance::betweenReplicates(std::uint32_t x, std::uint32_t y) co
 
 double LuminanceVariance::operator()(std::uint32_t x, std::uint32_t y) const {
     if (!(dof_ >= 1)) return kUnknown;
-    const std::uint64_t n = film_.counts[std::size_t{y} * film_.shape().width + x];
-    if (from_replicates_)
-        return n == film_.samples.count() ? betweenReplicates(x, y)
-                                          : kUnknown;  // The pixels whose samples were dropped are unknown.
+    const std::size_t pixel = std::size_t{y} * film_.shape().width + x;
+    const std::uint64_t n = film_.counts[pixel];
+    if (from_replicates_)  // Pixels whose samples or splats were dropped are unknown.
+        return n == film_.samples.count() && film_.droppedSplatsOf(pixel) == 0 ? betweenReplicates(x, y)
+                                                                              : kUnknown;
     if (n < 2) return kUnknown;
     const double mean = film_.mean(x, y, 1);
     // Rounding can push the difference of nearly equal numbers below zero.
@@ -276,7 +298,7 @@ std::optional<ErrorEstimate> estimateError(const Film& film, PixelSet which, con
     e.mean_standard_error = std::sqrt(total / sums.known / sums.pixels);
     e.relative_rmse = std::sqrt(total / sums.known) / e.mean_luminance;
     if (!(total > 0)) {  // Every sample the same: a furnace.
-        e.degrees_of_freedom = d * sums.known;
+        e.degrees_of_freedom = e.mean_degrees_of_freedom = d * sums.known;
         return e;
     }
     // Normal replicates have Var v = 2 v²/d, whose unbiased estimate is 2 v²/(d + 2); longer tails have
@@ -287,6 +309,11 @@ std::optional<ErrorEstimate> estimateError(const Film& film, PixelSet which, con
         spread = std::max(normal, measuredSpread(film, variance, variances, which, sums, unit, luminance) +
                                       (d < 3 ? kUnseen * sums.most * sums.most : 0));
     e.degrees_of_freedom = std::clamp(2 * sums.sum * sums.sum / spread, 1.0, d * sums.known);
+    e.mean_degrees_of_freedom = e.degrees_of_freedom;
+    if (!film.splats.empty()) {
+        e.mean_standard_error = standardErrorOfMean(film, which, sums.pixels);
+        e.mean_degrees_of_freedom = d;
+    }
     const bool too_few = e.degrees_of_freedom < std::min(kLeastDegreesOfFreedom, d * sums.known);
     // One path as bright as the scene's brightest adds this amount to the sum of variances.
     const double brightest = paths.brightest.luminance / static_cast<double>(film.samples.count()),
@@ -322,7 +349,7 @@ std::optional<ErrorEstimate> estimateError(const Film& film, PixelSet which, con
 stats::Interval ErrorEstimate::meanInterval(double confidence) const {
     if (mean_standard_error == 0) return {mean_luminance, mean_luminance};
     const double half_width =
-        stats::studentQuantile(0.5 + 0.5 * confidence, degrees_of_freedom) * mean_standard_error;
+        stats::studentQuantile(0.5 + 0.5 * confidence, mean_degrees_of_freedom) * mean_standard_error;
     return {mean_luminance - half_width, mean_luminance + half_width};
 }
 

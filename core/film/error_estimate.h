@@ -1,7 +1,8 @@
 /// Estimates the error of a film without a reference: from the spread between its replicates (layout.h:
 /// CRT_REPLICATES_MAX), which is unbiased for any sampler; or, without replicates, from the spread between
-/// samples, unbiased for independent ones and an upper bound for a Sobol sequence. All of it is about
-/// luminance Y. None of it sees a bias that all samples share.
+/// samples, unbiased for independent ones and an upper bound for a Sobol sequence. A film with splats needs
+/// replicates: each splat belongs to the replicate of its sample. All of it is about luminance Y. None of it
+/// sees a bias that all samples share.
 #pragma once
 
 #include "base/statistics.h"
@@ -54,7 +55,8 @@ enum class ErrorKnowledge {
 };
 
 /// Relative to the image's mean luminance. Pixels are independent of each other, each with a separate
-/// scramble.
+/// scramble. Those of films with splats have samples in common: the error of their mean comes from the means
+/// of the replicates.
 struct ErrorEstimate {
     ErrorKnowledge knowledge = ErrorKnowledge::Bound;
     double mean_luminance = 0;
@@ -69,6 +71,7 @@ struct ErrorEstimate {
     /// Of the mean's variance S: 2 S² / Var S (Satterthwaite 1946), where Var S is measured and not taken
     /// from the normal distribution.
     double degrees_of_freedom = 0;
+    double mean_degrees_of_freedom = 0;  ///< Of mean_standard_error.
     /// Luminance of the scene's rare brightest paths over the mean luminance; 0 if it has none.
     double rare_paths = 0;
 
@@ -81,7 +84,7 @@ struct ErrorEstimate {
 };
 
 /// Nothing where nothing is known: too few samples, replicates that are not about equally full (nor squares
-/// in the film), or no light found yet.
+/// in the film, or splats beside them), or no light found yet.
 std::optional<ErrorEstimate> estimateError(const Film& film, PixelSet which = PixelSet::All,
                                            const PathFacts& paths = {});
 

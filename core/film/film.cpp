@@ -36,8 +36,29 @@ void addPair(double* pair, const double* other) {
     twoSum(high, low + low_error, pair[0], pair[1]);
 }
 
+/// The same of the splats of a pixel: sums of 128 bits, then their number (kernel/dialect/channels.h).
+void addSplats(std::uint64_t* to, const std::uint64_t* from, std::size_t words) {
+    for (std::size_t i = 0; i + 1 < words; i += 2) {
+        to[i] += from[i];
+        to[i + 1] += from[i + 1] + (to[i] < from[i] ? 1 : 0);
+    }
+    if (words != 0) to[words - 1] += from[words - 1];
+}
+
+/// A sum of the plane of splats.
+__int128 splatUnits(const Film& film, std::uint32_t x, std::uint32_t y, std::uint32_t sum) {
+    const std::size_t pixel = std::size_t{y} * film.shape().width + x;
+    const std::uint64_t* words = &film.splats[pixel * film.shape().splatWords() + std::size_t{2} * sum];
+    return static_cast<__int128>(static_cast<unsigned __int128>(words[1]) << 64 | words[0]);
+}
+
 bool hasRightChannels(const FilmShape& shape) {
     const std::uint32_t replicates = shape.replicates();
+    int exponent = 0;
+    const bool has_scale = std::isnormal(shape.splat_scale) &&
+                           std::frexp(shape.splat_scale, &exponent) == 0.5;
+    const bool has_splats = (shape.aovs & kAovSplats) != 0;
+    if (has_scale != has_splats || (!has_scale && shape.splat_scale != 0)) return false;
     return shape.channels >= shape.spectral &&
            shape.firstSpectral() == channelsFor(shape.aovs, replicates) &&
            std::has_single_bit(replicates) && replicates <= CRT_REPLICATES_MAX;
@@ -110,7 +131,8 @@ Film::Film(FilmShape shape) : shape_(shape) {
     const std::size_t pixels = std::size_t{shape.width} * shape.height;
     // Said beforehand: a system that promises memory which it does not have would end the process in the
     // middle.
-    const std::uint64_t bytes = std::uint64_t{pixels} * (16 * std::uint64_t{shape.channels} + 8);
+    const std::uint64_t bytes =
+        std::uint64_t{pixels} * (16 * std::uint64_t{shape.channels} + 8 + 8 * shape.splatWords());
     constexpr std::uint64_t kWorthAsking = std::uint64_t{1} << 28;
     if (bytes > kWorthAsking && bytes > availableHostMemory())
         throw Error(ErrorKind::Device,
@@ -121,6 +143,7 @@ Film::Film(FilmShape shape) : shape_(shape) {
     sums.assign(pixels * shape.channels * 2, 0.0);
     counts.assign(pixels, 0);
     if (shape.aovs & kAovPrimitive) primitives.assign(pixels, CRT_NONE);
+    splats.assign(pixels * shape.splatWords(), 0);
 }
 
 void Film::add(const Film& other) {
@@ -140,6 +163,9 @@ void Film::add(const Film& other) {
     parallelFor(counts.size(), kPixelsAtOnce, [&](std::size_t first, std::size_t end) {
         for (std::size_t i = first * values; i < end * values; i += 2) addPair(&sums[i], &other.sums[i]);
         for (std::size_t i = first; i < end; ++i) counts[i] += other.counts[i];
+        const std::size_t words = shape_.splatWords();
+        for (std::size_t i = first; i < end; ++i)
+            addSplats(&splats[i * words], &other.splats[i * words], words);
     });
     // The lower first sample wins, so that the id plane does not depend on who is added to whom.
     const auto& mine = samples.ranges();
@@ -156,7 +182,17 @@ double Film::sum(std::uint32_t x, std::uint32_t y, std::uint32_t channel) const 
 
 double Film::mean(std::uint32_t x, std::uint32_t y, std::uint32_t channel) const {
     const std::uint64_t n = counts[std::size_t{y} * shape_.width + x];
-    return n == 0 ? 0.0 : sum(x, y, channel) / static_cast<double>(n);
+    const double own = n == 0 ? 0.0 : sum(x, y, channel) / static_cast<double>(n);
+    if (splats.empty() || channel >= CRT_CHANNELS_BASE || samples.count() == 0) return own;
+    return own + splatSum(x, y, channel) / static_cast<double>(samples.count());
+}
+
+double Film::splatSum(std::uint32_t x, std::uint32_t y, std::uint32_t channel) const {
+    if (splats.empty() || channel >= CRT_CHANNELS_BASE) return 0;
+    if (channel != 1) return static_cast<double>(splatUnits(*this, x, y, channel)) / shape_.splat_scale;
+    __int128 units = 0;
+    for (std::uint32_t r = 0; r < replicates(); ++r) units += splatUnits(*this, x, y, CRT_SPLAT_SUM_OF(r));
+    return static_cast<double>(units) / shape_.splat_scale;
 }
 
 std::uint32_t FilmShape::replicates() const {
@@ -165,8 +201,12 @@ std::uint32_t FilmShape::replicates() const {
 }
 
 double Film::replicateSum(std::uint32_t x, std::uint32_t y, std::uint32_t replicate) const {
+    double splatted = 0;
+    if (!splats.empty())
+        splatted =
+            static_cast<double>(splatUnits(*this, x, y, CRT_SPLAT_SUM_OF(replicate))) / shape_.splat_scale;
     const std::uint32_t first = firstChannel(shape_.aovs, kAovReplicates), stored = replicates() - 1;
-    if (replicate < stored) return sum(x, y, first + replicate);
+    if (replicate < stored) return sum(x, y, first + replicate) + splatted;
     // In pairs: next to one bright sample in another replicate, this one's sum would be rounding.
     const double* pixel = &sums[(std::size_t{y} * shape_.width + x) * shape_.channels * 2];
     double rest[2] = {pixel[2], pixel[3]};  // Y
@@ -174,7 +214,11 @@ double Film::replicateSum(std::uint32_t x, std::uint32_t y, std::uint32_t replic
         const double minus[2] = {-pixel[(first + r) * 2], -pixel[(first + r) * 2 + 1]};
         addPair(rest, minus);
     }
-    return rest[0] + rest[1];
+    return rest[0] + rest[1] + splatted;
+}
+
+std::uint32_t FilmShape::splatWords() const {
+    return (aovs & kAovSplats) != 0 ? CRT_SPLAT_WORDS(replicates()) : 0;
 }
 
 std::uint64_t Film::replicateSamples(std::uint32_t replicate) const {
@@ -189,6 +233,16 @@ std::uint64_t Film::invalidSamples() const {
     std::uint64_t invalid = 0;
     for (const std::uint64_t n : counts) invalid += asked > n ? asked - n : 0;
     return invalid;
+}
+
+std::uint64_t Film::droppedSplats() const {
+    std::uint64_t dropped = 0;
+    for (std::size_t pixel = 0; pixel < counts.size(); ++pixel) dropped += droppedSplatsOf(pixel);
+    return dropped;
+}
+
+std::uint64_t Film::droppedSplatsOf(std::size_t pixel) const {
+    return splats.empty() ? 0 : splats[(pixel + 1) * shape_.splatWords() - 1];
 }
 
 Film cropped(const Film& film, const std::array<int, 4>& window) {
@@ -215,6 +269,7 @@ Film cropped(const Film& film, const std::array<int, 4>& window) {
     copyRows(film.sums, part.sums, std::size_t{2} * whole.channels);
     copyRows(film.counts, part.counts, 1);
     copyRows(film.primitives, part.primitives, 1);
+    copyRows(film.splats, part.splats, whole.splatWords());
     return part;
 }
 

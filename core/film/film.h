@@ -45,11 +45,14 @@ struct FilmShape {
     std::uint32_t aovs =
         0;  ///< Bits of Aov that need film channels or the primitive plane, kAovReplicates among them.
     std::uint32_t spectral = 0;  ///< Of these channels, the last: scene/spectral_film.h.
+    double splat_scale = 0;  ///< CrtScene::splat_scale: of the plane that kAovSplats says is there.
     /// Independent sequences that samples take turns between (layout.h); 1: the film does not tell them
     /// apart.
     std::uint32_t replicates() const;
     /// The first of the `spectral` channels.
     std::uint32_t firstSpectral() const { return channels - spectral; }
+    /// Words of a pixel in the plane of splats (kernel/dialect/channels.h); 0: the film takes none.
+    std::uint32_t splatWords() const;
     bool operator==(const FilmShape&) const = default;
 };
 
@@ -61,23 +64,31 @@ public:
     std::vector<double> sums;              ///< [height][width][channels][2]
     std::vector<std::uint64_t> counts;     ///< [height][width]
     std::vector<std::uint32_t> primitives; ///< [height][width] or empty
+    std::vector<std::uint64_t> splats;     ///< [height][width][splatWords()]: kernel/film/splat.h
     SampleRanges samples;                  ///< Ranges asked for (every pixel has the same).
 
     /// Adds another film of disjoint sample ranges. Primitive ids are taken from the film with the lower
     /// first sample. Throws crt::Error(Usage) when shapes differ or ranges overlap.
     void add(const Film& other);
 
-    /// hi + lo rounded to double.
+    /// hi + lo rounded to double: of the pixel's own samples, without splats.
     double sum(std::uint32_t x, std::uint32_t y, std::uint32_t channel) const;
-    /// Mean of a channel; 0 when the pixel has no valid sample.
+    /// X, Y or Z of all splats on the pixel, by the channel's number; 0 for other channels.
+    double splatSum(std::uint32_t x, std::uint32_t y, std::uint32_t channel) const;
+    /// Mean of a channel; 0 when the pixel has no valid sample. Splats come from the samples of all pixels:
+    /// their sum is divided by the number of samples that were asked for, whichever of them were valid.
     double mean(std::uint32_t x, std::uint32_t y, std::uint32_t channel) const;
-    /// Sum of Y of the samples of a replicate (layout.h), and how many samples were asked of it;
-    /// error_estimate.h makes error bars of them.
+    /// Sum of Y of the samples of a replicate (layout.h) and of their splats, and how many samples were
+    /// asked of it; error_estimate.h makes error bars of them.
     std::uint32_t replicates() const { return shape_.replicates(); }
     double replicateSum(std::uint32_t x, std::uint32_t y, std::uint32_t replicate) const;
     std::uint64_t replicateSamples(std::uint32_t replicate) const;
     /// Samples that were NaN or infinite and were dropped.
     std::uint64_t invalidSamples() const;
+    /// Splats that were NaN, infinite or too large, and were left out: of all pixels, and of one by its
+    /// number.
+    std::uint64_t droppedSplats() const;
+    std::uint64_t droppedSplatsOf(std::size_t pixel) const;
 
 private:
     FilmShape shape_;

@@ -36,7 +36,7 @@ struct Section {
 
 /// The sections of a film, const or not, in the order of the file.
 template <class Byte, class AnyFilm>
-std::array<Section<Byte>, 3> sectionsOf(AnyFilm& film) {
+std::array<Section<Byte>, 4> sectionsOf(AnyFilm& film) {
     const auto section = [](auto& values, std::size_t pixels) {
         using Value = typename std::remove_reference_t<decltype(values)>::value_type;
         const std::size_t bytes = values.size() * sizeof(Value);
@@ -44,7 +44,8 @@ std::array<Section<Byte>, 3> sectionsOf(AnyFilm& film) {
                              pixels == 0 ? 0 : bytes / pixels};
     };
     const std::size_t pixels = film.counts.size();
-    return {section(film.sums, pixels), section(film.counts, pixels), section(film.primitives, pixels)};
+    return {section(film.sums, pixels), section(film.counts, pixels), section(film.primitives, pixels),
+            section(film.splats, pixels)};
 }
 
 /// Several planes of one block, filled at once: a walk over the block for each single plane would load each
@@ -228,7 +229,8 @@ std::vector<unsigned char> packFilm(const Film& film) {
 unsigned __int128 leastPackedBytes(const FilmShape& shape) {
     using Wide = unsigned __int128;
     const Wide blocks = (Wide{shape.width} * shape.height + kPackedPixels - 1) / kPackedPixels;
-    const Wide planes = Wide{shape.channels} * 16 + 8 + ((shape.aovs & kAovPrimitive) != 0 ? 4 : 0);
+    const Wide planes = Wide{shape.channels} * 16 + 8 + ((shape.aovs & kAovPrimitive) != 0 ? 4 : 0) +
+                        Wide{8} * shape.splatWords();
     return blocks * planes * kLeastPlane;
 }
 

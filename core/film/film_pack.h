@@ -2,8 +2,8 @@
 ///
 /// Of the bytes of sums some hardly differ from pixel to pixel (signs and exponents, the lower halves of
 /// pairs, counts) and others are noise. So bytes of the same kind are put side by side: each section (sums,
-/// counts, primitive ids) is divided into blocks of kPackedPixels pixels, the last one shorter, and a block
-/// into planes, one for each byte of a pixel's record. A plane is
+/// counts, primitive ids, splats) is divided into blocks of kPackedPixels pixels, the last one shorter, and
+/// a block into planes, one for each byte of a pixel's record. A plane is
 ///
 ///     u32      n: bytes that follow
 ///     n bytes  n = 1: the byte that all of the plane are; n = number of pixels: the plane as it is;
@@ -21,8 +21,8 @@ namespace crt {
 
 inline constexpr std::size_t kPackedPixels = 16384;
 
-/// Sums, counts and primitive ids of `film`. The same film gives the same bytes with the same version of
-/// zstd.
+/// Sums, counts, primitive ids and splats of `film`. The same film gives the same bytes with the same
+/// version of zstd.
 std::vector<unsigned char> packFilm(const Film& film);
 
 /// The least that a packed film of this shape takes: a file with less is damaged, and nothing need be

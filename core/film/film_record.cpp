@@ -524,7 +524,7 @@ std::vector<std::string> differingTraits(const FilmRecord& found, const FilmReco
 
 bool FilmRecord::holdsRadiance() const {
     return std::any_of(traits.begin(), traits.end(), [](const SceneTrait& trait) {
-        return trait.name == kIntegratorTrait && trait.text == rowOf(IntegratorType::Path).word;
+        return trait.name == kIntegratorTrait && measuresLight(trait.text);
     });
 }
 

@@ -165,6 +165,7 @@ Image resolveImage(const Film& film, const Development& development, std::uint32
                 case kAovNormal: append(triple(first)); break;
                 case kAovDepth: add(film.mean(x, y, first)); break;
                 case kAovSquares:
+                case kAovSplats:
                 case kAovReplicates: break;
                 case kAovPrimitive: *integers++ = film.primitives[pixel]; break;
                 case kAovVariance: add(noise->pooled.variances[pixel] * gain * gain); break;
@@ -197,6 +198,8 @@ Image resolveImage(const Film& film, const Development& development, std::uint32
                       {kExposureKey, fmt::format("{}", development.exposure_ev)},
                       {kWhiteBalanceKey, whiteBalanceText(development)},
                       {"crt/invalidSamples", std::to_string(film.invalidSamples())}};
+    if (!film.splats.empty())
+        image.metadata.emplace_back("crt/droppedSplats", std::to_string(film.droppedSplats()));
     if (spectral.bins.count > 0) {
         image.metadata.emplace_back("spectralLayoutVersion", "1.0");
         image.metadata.emplace_back("emissiveUnits", "W.m^-2.sr^-1.nm^-1");

@@ -73,6 +73,11 @@ void DeviceFilm::setScene(const std::function<void(double)>& progress) {
 /// Devices do not say how much of a film they could hold: other programs share their memory, and drivers
 /// take some of it when they see fit. So it is tried.
 void DeviceFilm::beginBands(const Error& why) {
+    if (scene_.header().splat_scale != 0)
+        throw Error(ErrorKind::Device,
+                    fmt::format("{}; and a film whose samples add to other pixels than their own cannot be "
+                                "rendered in bands: reduce it, or render parts of it with --crop",
+                                why.what()));
     std::uint32_t rows = scene_.header().height;
     for (bool fits = false; !fits;) {
         rows = (rows + 1) / 2;

@@ -2,7 +2,8 @@
 ///
 /// A band is a window of the film (CrtScene::crop_y and height), rendered for a whole range of samples, read
 /// back, and put into its rows on the host. A sample depends on its pixel and its number alone, so the film
-/// is that of a device with room for all of it (docs/decisions/0040-films-in-bands.md).
+/// is that of a device with room for all of it (docs/decisions/0040-films-in-bands.md). A film that takes
+/// splats is not rendered in bands, as the samples of each band add to all rows.
 #pragma once
 
 #include "backend/device_group.h"

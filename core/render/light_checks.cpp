@@ -200,6 +200,9 @@ bool isBlack(const Film& film) {
     for (std::size_t pixel = 0; pixel < film.sums.size(); pixel += stride)
         for (std::size_t i = 0; i < 6; ++i)  // X, Y and Z, each hi and lo.
             if (film.sums[pixel + i] != 0) return false;
+    const std::size_t words = film.shape().splatWords();
+    for (std::size_t i = 0; i < film.splats.size(); ++i)
+        if (film.splats[i] != 0 && i % words + 1 != words) return false;  // The last one counts the dropped.
     return true;
 }
 

@@ -86,10 +86,18 @@ bool isComplete(const RunFacts& facts) {
 void judge(const Film& film, const Scene& scene, RunFacts& facts) {
     facts.samples = film.samples;
     facts.invalid_samples = film.invalidSamples();
+    facts.dropped_splats = film.droppedSplats();
     warnOfBlackFilm(film, scene);
     warnOfLargeUnits(film, scene);
     if (facts.invalid_samples > 0)
         logWarning("{} samples were NaN or infinite and were left out", facts.invalid_samples);
+    if (facts.dropped_splats > 0)
+        logWarning("{} splats were NaN, infinite or more than 2^31 times the power of the scene's lights, "
+                   "and were left out",
+                   facts.dropped_splats);
+    if (!film.splats.empty() && film.replicates() == 1)
+        logWarning("the error of the image is unknown: samples add to other pixels than their own, and "
+                   "sampler.replicates is 1; with 2 or more it is estimated");
 }
 
 }  // namespace
@@ -160,7 +168,8 @@ void SceneOnDevices::compile() {
         session_ ? session_->compile(scene_, aovs)
                  : compileScene(scene_, aovs, {.accelerator_reach = kNobodyTraces}));
     const Stopwatch looking;
-    brightest_path_ = brightestPathOf(*compiled_);
+    // Of paths from the camera to their own pixel; splats are none.
+    if (!splats(scene_.integrator.type)) brightest_path_ = brightestPathOf(*compiled_);
     logDebug("the brightest paths have a luminance of {:.3g}{} ({:.3f} s)", brightest_path_.luminance,
              brightest_path_.rare ? ", and are rare" : "", looking.seconds());
     logDebug("scene {} needs {}", compiled_->hash, featureNames(compiled_->header().features));

@@ -184,7 +184,8 @@ std::string reportJson(const Scene& scene, const CompiledScene& compiled, const 
                          {"rendered", facts.rendered_samples},
                          {"ranges", std::move(ranges)},
                          {"chunks", facts.chunks},
-                         {"invalid", facts.invalid_samples}};
+                         {"invalid", facts.invalid_samples},
+                         {"dropped_splats", facts.dropped_splats}};
     report["rays"] = {{"paths", b.paths}, {"closest", b.closest_rays}, {"shadow", b.shadow_rays}};
     report["speed"] = {{"mpaths_per_second", perSecond(static_cast<double>(b.paths) * 1e-6, render_seconds)},
                        {"mrays_per_second", perSecond(rays * 1e-6, render_seconds)}};

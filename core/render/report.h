@@ -38,6 +38,7 @@ struct RunFacts {
     std::uint64_t chunks = 0;
     std::uint64_t film_bands = 1;       ///< In which the film was rendered; 1: as a whole.
     std::uint64_t invalid_samples = 0;
+    std::uint64_t dropped_splats = 0;  ///< NaN, infinite or too large (kernel/film/splat.h).
     std::optional<ErrorEstimate> error; ///< Of the film, by all replicates; nothing while unknown.
     std::optional<ErrorEstimate> even_pixels,
         odd_pixels;  ///< With a target error: both must reach it.

@@ -21,7 +21,7 @@ enum Aov : std::uint32_t {
 };
 
 /// The code, of the kernel or of the film, that makes the values of an AOV.
-enum class AovSource { FirstHit, Samples, Ids, Film };
+enum class AovSource { FirstHit, Samples, Ids, Splats, Film };
 
 struct AovRow {
     Aov aov;
@@ -37,6 +37,7 @@ inline constexpr AovRow kAovRows[] = {
 #define CRT_SOURCE_FIRST_HIT AovSource::FirstHit
 #define CRT_SOURCE_SAMPLES AovSource::Samples
 #define CRT_SOURCE_IDS AovSource::Ids
+#define CRT_SOURCE_SPLATS AovSource::Splats
 #define CRT_SOURCE_FILM AovSource::Film
 #define CRT_TYPE_FLOAT false
 #define CRT_TYPE_UINT true
@@ -48,6 +49,7 @@ inline constexpr AovRow kAovRows[] = {
 #undef CRT_SOURCE_FIRST_HIT
 #undef CRT_SOURCE_SAMPLES
 #undef CRT_SOURCE_IDS
+#undef CRT_SOURCE_SPLATS
 #undef CRT_SOURCE_FILM
 #undef CRT_TYPE_FLOAT
 #undef CRT_TYPE_UINT

@@ -33,6 +33,7 @@ public:
         sums_.assign(pixels * header().channels * 2, 0.0);
         counts_.assign(pixels, 0);
         primitives_.assign((header().aovs & CRT_AOV_PRIMITIVE) != 0 ? pixels : 0, CRT_NONE);
+        splats_.assign(pixels * crt::kernel::crt_splat_words(&header()), 0);
         paths_ = closest_rays_ = shadow_rays_ = 0;
         seconds_ = 0;
     }
@@ -52,7 +53,8 @@ public:
                     crt::kernel::CrtRayCount rays{};
                     crt::kernel::crt_render_pixel(&context, x, y, range.first_sample + done, count,
                                                   sums_.data(), counts_.data(),
-                                                  primitives_.empty() ? nullptr : primitives_.data(), &rays);
+                                                  primitives_.empty() ? nullptr : primitives_.data(),
+                                                  splats_.empty() ? nullptr : splats_.data(), &rays);
                     closest_rays_ += rays.closest;
                     shadow_rays_ += rays.shadow;
                     paths_ += count;
@@ -69,6 +71,7 @@ public:
         std::copy(sums_.begin(), sums_.end(), film.sums);
         std::copy(counts_.begin(), counts_.end(), film.counts);
         if (film.primitives != nullptr) std::copy(primitives_.begin(), primitives_.end(), film.primitives);
+        if (film.splats != nullptr) std::copy(splats_.begin(), splats_.end(), film.splats);
     }
 
     void report(CrtBackendReport& report) {
@@ -97,6 +100,7 @@ private:
     std::vector<double> sums_;
     std::vector<std::uint64_t> counts_;
     std::vector<std::uint32_t> primitives_;
+    std::vector<std::uint64_t> splats_;
     std::uint64_t paths_ = 0, closest_rays_ = 0, shadow_rays_ = 0;
     double seconds_ = 0;
 };

@@ -103,6 +103,7 @@ void EmbreeIntegrator::setScene(const CrtSceneBlob& scene_blob) {
     sums_.assign(pixels * scene().channels * 2, 0.0);
     counts_.assign(pixels, 0);
     primitives_.assign((scene().aovs & CRT_AOV_PRIMITIVE) != 0 ? pixels : 0, CRT_NONE);
+    splats_.assign(pixels * crt_splat_words(&scene()), 0);
 }
 
 std::uint32_t EmbreeIntegrator::tileSize(const CrtRenderRange& range) const {
@@ -152,6 +153,7 @@ bool EmbreeIntegrator::render(const CrtRenderRange& range) {
                     job.sums = sums_.data();
                     job.counts = counts_.data();
                     job.primitives = primitives_.empty() ? nullptr : primitives_.data();
+                    job.splats = splats_.empty() ? nullptr : splats_.data();
                     job.cancelled = [](void* host) { return (*static_cast<decltype(tell)*>(host))(); };
                     job.host = const_cast<void*>(static_cast<const void*>(&tell));
                     for (std::uint64_t s = 0;
@@ -182,6 +184,7 @@ void EmbreeIntegrator::readFilm(const CrtFilmView& film) {
     std::copy(sums_.begin(), sums_.end(), film.sums);
     std::copy(counts_.begin(), counts_.end(), film.counts);
     if (film.primitives != nullptr) std::copy(primitives_.begin(), primitives_.end(), film.primitives);
+    if (film.splats != nullptr) std::copy(splats_.begin(), splats_.end(), film.splats);
 }
 
 void EmbreeIntegrator::report(CrtBackendReport& report) {

@@ -52,6 +52,7 @@ private:
     std::vector<double> sums_;
     std::vector<kernel::u64> counts_;
     std::vector<std::uint32_t> primitives_;
+    std::vector<kernel::u64> splats_;
     double build_seconds_ = 0, render_seconds_ = 0;
     std::uint64_t paths_ = 0;
     RayTotals rays_;

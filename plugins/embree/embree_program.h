@@ -20,6 +20,7 @@ struct TileJob {
     double* sums;
     kernel::u64* counts;
     std::uint32_t* primitives;
+    kernel::u64* splats;  ///< Null: the film takes none.
     bool (*cancelled)(void* host);  ///< Asked now and then; true: the job may end at any place.
     void* host;
 };

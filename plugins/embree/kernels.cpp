@@ -64,7 +64,7 @@ RayTotals CRT_EMBREE_ENTRY(const TileJob& job) {
     ctx.tree = job.tree;
     const auto pixel = [&](std::uint32_t x, std::uint32_t y) {
         return crt_pixel_begin(&ctx, x, y, job.first_sample, job.sample_count, job.sums, job.counts,
-                               job.primitives);
+                               job.primitives, job.splats);
     };
     RayTotals totals;
     for (std::uint32_t y = job.y0; y < job.y1; ++y) {

@@ -73,8 +73,8 @@ GpuFilm GpuIntegrator::allocateFilm(std::uint64_t copies, const char* what) {
 }
 
 void GpuIntegrator::noteMemory() {
-    peak_bytes_ = std::max(peak_bytes_, blob_.bytes + rays_.bytes + film_.bytes() + slices_.bytes() +
-                                            (wavefront_ ? wavefront_->bytes() : 0));
+    peak_bytes_ = std::max(peak_bytes_, blob_.bytes + rays_.bytes + splats_.bytes + film_.bytes() +
+                                            slices_.bytes() + (wavefront_ ? wavefront_->bytes() : 0));
 }
 
 void GpuIntegrator::setScene(const CrtSceneBlob& blob) {
@@ -88,6 +88,7 @@ void GpuIntegrator::setScene(const CrtSceneBlob& blob) {
     slices_ = GpuFilm();
     slice_count_ = 0;
     rays_ = GpuBuffer();
+    splats_ = GpuBuffer();
     wavefront_.reset();
     render_seconds_ = 0;
     paths_ = 0;
@@ -105,6 +106,9 @@ void GpuIntegrator::setScene(const CrtSceneBlob& blob) {
     useKernels(wavefront_ ? wavefront_->plan().kernels : Specs{render}, mayOutlastLaunch(scene.max_depth));
 
     const Stopwatch uploading;
+    const std::uint64_t splat_words = kernel::crt_splat_words(&scene);
+    const std::uint64_t splat_bytes = splat_words * scene.width * scene.height * sizeof(std::uint64_t);
+    if (splat_bytes != 0) splats_ = allocateFilled(splat_bytes, 0, "the film's splats");
     film_ = allocateFilm(1, "the film");
     rays_ = allocateFilled(kRayCounters * 2 * sizeof(std::uint64_t), 0, "the ray counters");
     GpuBuffer uploaded = device_->allocate(blob.size_bytes, "the scene");
@@ -156,7 +160,7 @@ void GpuIntegrator::launchRender(const GpuKernel& kernel, const Launch& launch, 
     if (device.struct_arguments) arguments.push_back(target.scene);
     arguments.insert(arguments.end(), {target.blob, launch.x0, launch.y0, launch.x1, launch.y1,
                                        launch.first_sample, launch.sample_count, target.film.sums,
-                                       target.film.counts, target.film.primitives, target.rays});
+                                       target.film.counts, target.film.primitives, splats_, target.rays});
     const std::uint64_t blocks = divideUp(launch.x1 - launch.x0, device.block_width) *
                                  divideUp(launch.y1 - launch.y0, device.block_height);
     device_->launch(kernel.entry, "crt_render", {blocks, device.block_width * device.block_height, slices},
@@ -243,6 +247,7 @@ void GpuIntegrator::readFilm(const CrtFilmView& film) {
     device_->read(film_.sums, film.sums);
     device_->read(film_.counts, film.counts);
     if (film.primitives != nullptr) device_->read(film_.primitives, film.primitives);
+    if (film.splats != nullptr) device_->read(splats_, film.splats);
 }
 
 void GpuIntegrator::report(CrtBackendReport& report) {

@@ -61,6 +61,7 @@ private:
     std::optional<Wavefront> wavefront_;  ///< None: the scene is not rendered in waves.
     kernel::CrtScene scene_{};            ///< The blob's header.
     GpuBuffer blob_, rays_;
+    GpuBuffer splats_;  ///< One plane, for the film and for all slices; no memory: the film takes none.
     GpuFilm film_, slices_;
     std::uint32_t slice_count_ = 0;  ///< Films in slices_.
 

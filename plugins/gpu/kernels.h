@@ -40,11 +40,12 @@
 /*
  * Samples [first_sample, first_sample + sample_count) of the pixels [x0, x1) × [y0, y1). A warp has 8 × 4
  * pixels. `sums`, `counts`, `primitives` are the film when the grid has one row, else one film after
- * another, one for each row.
+ * another, one for each row. `splats` is one plane for all rows, as its sums have no order; it may be null.
  */
 CRT_ENTRY(CRT_BLOCK)
 crt_render(CRT_SCENE_ARGUMENTS, u32 x0, u32 y0, u32 x1, u32 y1, u64 first_sample, u32 sample_count,
-           CRT_GLOBAL f64 *sums, CRT_GLOBAL u64 *counts, CRT_GLOBAL u32 *primitives, CRT_GLOBAL u64 *rays) {
+           CRT_GLOBAL f64 *sums, CRT_GLOBAL u64 *counts, CRT_GLOBAL u32 *primitives, CRT_GLOBAL u64 *splats,
+           CRT_GLOBAL u64 *rays) {
     const u32 blocks_across = (x1 - x0 + CRT_BLOCK_WIDTH - 1u) / CRT_BLOCK_WIDTH;
     const u32 warps_across = (CRT_BLOCK_WIDTH + 7u) / 8u;
     const u32 warp = crt_thread() / 32u;
@@ -66,7 +67,7 @@ crt_render(CRT_SCENE_ARGUMENTS, u32 x0, u32 y0, u32 x1, u32 y1, u64 first_sample
     traced.shadow = 0u;
     crt_render_pixel(&context, x, y, first_sample + first, last - first,
                      sums + film * context.scene->channels * 2u, counts + film,
-                     primitives != 0 ? primitives + film : 0, &traced);
+                     primitives != 0 ? primitives + film : 0, splats, &traced);
 
     CRT_GLOBAL u64 *counter = rays + 2u * ((crt_block() + 37u * slice) % CRT_RAY_COUNTERS);
     crt_count(counter, traced.closest);

@@ -40,12 +40,7 @@
 #define CRT_GROUP __local
 #define CRT_GROUP_WORDS(name) CRT_GROUP u32 name[2u * CRT_WAVE_QUEUES + 3u]
 
-/* OpenCL 1.2 promises atomics of 32 bits only: a counter is two words, low first. */
-CRT_FN void crt_count(CRT_GLOBAL u64 *counter, u32 n) {
-    volatile CRT_GLOBAL u32 *words = (volatile CRT_GLOBAL u32 *)counter;
-    const u32 before = atomic_add(&words[0], n);
-    if (before + n < before) atomic_inc(&words[1]);
-}
+CRT_FN void crt_count(CRT_GLOBAL u64 *counter, u32 n) { (void)crt_atomic_carry(counter, n); }
 CRT_FN void crt_add(CRT_GLOBAL u32 *word, u32 n) { atomic_add((volatile CRT_GLOBAL u32 *)word, n); }
 
 /* The slots of a block take their places together: one atomic of the device a queue. */

@@ -249,6 +249,36 @@ class Merging(CliTest):
         self.crt("merge", "--scene", "scene.yaml", "--seed", "3", "-o", "m.pfm", "c.crtfilm")
 
 
+class Splats(CliTest):
+    """Samples that add to other pixels than their own, in files."""
+
+    def setUp(self):
+        super().setUp()
+        if "embree" not in harness.real_backends():
+            self.skipTest("there is no embree")
+        self.write("splats.yaml", LIT + "integrator: {type: splat_test}\n")
+
+    def render(self, *arguments):
+        return self.crt("splats.yaml", "-b", "embree", *arguments, CRT_BACKEND_PATH="")
+
+    def test_parts_and_resumed_renders_are_the_whole(self):
+        self.render("--spp", "24", "-o", "whole.pfm")
+        self.assertEqual(self.report("whole.report.json")["samples"]["dropped_splats"], 0)
+        self.assertEqual(self.report("whole.report.json")["error"]["knowledge"], "known")
+        self.render("--samples", "0:9", "-o", "a.crtfilm")
+        self.render("--samples", "9:24", "-o", "b.crtfilm")
+        self.crt("merge", "-o", "merged.pfm", "b.crtfilm", "a.crtfilm")
+        self.assertEqual(read_bytes(self.path("merged.pfm")), read_bytes(self.path("whole.pfm")))
+        self.render("--spp", "24", "-o", "resumed.pfm", "--resume", "a.crtfilm")
+        self.assertEqual(read_bytes(self.path("resumed.pfm")), read_bytes(self.path("whole.pfm")))
+
+    def test_without_replicates_the_error_is_unknown(self):
+        run = self.render("--spp", "8", "-o", "a.crtfilm", "--set", "sampler.replicates=1")
+        self.assertIn("the error of the image is unknown", run.stderr)
+        self.assertIsNone(self.report("a.report.json")["error"])
+        self.assertIn("without replicates", self.crt("info", "a.crtfilm").stdout)
+
+
 class Developing(CliTest):
     """A film's record of its scene is enough to make every image of it again."""
 

@@ -97,7 +97,7 @@ void launchRender(const void* scene_blob, const Launch& launch, std::uint32_t sl
     launchGrid(across * down, slices, host_threads, [&] {
         crt_render(scene, static_cast<const unsigned char*>(scene_blob), launch.x0, launch.y0, launch.x1,
                    launch.y1, launch.first_sample, launch.sample_count, film.sums, device(film.counts),
-                   film.primitives, device(rays));
+                   film.primitives, device(film.splats), device(rays));
     });
 }
 

@@ -13,6 +13,7 @@ struct FilmPointers {
     double* sums;
     std::uint64_t* counts;
     std::uint32_t* primitives;
+    std::uint64_t* splats;  ///< One plane, whatever the number of slices; null: none.
 };
 
 std::uint32_t rayCounterPairs();

@@ -38,6 +38,7 @@ public:
         std::memcpy(blob_.data(), blob.data, blob.size_bytes);
         film_ = HostFilm(1, scene);
         slices_ = HostFilm(kSlices, scene);
+        splats_.assign(film_.counts.size() * kernel::crt_splat_words(&scene), 0);
         rays_.assign(2 * rayCounterPairs(), 0);
         paths_ = 0;
     }
@@ -52,10 +53,10 @@ public:
             const bool slices = launch.sample_count >= kSlices;
             const auto take = launches_++ % 2 == 0 || !hasWaves() ? launchRender : launchWave;
             HostFilm& film = slices ? slices_ : film_;
-            take(blob_.data(), launch, slices ? kSlices : 1, film.pointers(), rays_.data(), threads_);
+            take(blob_.data(), launch, slices ? kSlices : 1, film.pointers(splats_), rays_.data(), threads_);
             if (slices)
-                launchAddSlices(blob_.data(), launch, kSlices, film_.pointers(), slices_.pointers(),
-                                threads_);
+                launchAddSlices(blob_.data(), launch, kSlices, film_.pointers(splats_),
+                                slices_.pointers(splats_), threads_);
             const double seconds =
                 std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
             pacer_.finished(launch, seconds);
@@ -71,6 +72,7 @@ public:
         std::copy(film_.counts.begin(), film_.counts.end(), film.counts);
         if (film.primitives != nullptr)
             std::copy(film_.primitives.begin(), film_.primitives.end(), film.primitives);
+        if (film.splats != nullptr) std::copy(splats_.begin(), splats_.end(), film.splats);
     }
 
     void report(CrtBackendReport& report) {
@@ -89,7 +91,7 @@ public:
 private:
     static constexpr std::uint32_t kSlices = 3;
 
-    /// A view is no path.
+    /// Waves know the path tracer alone.
     bool hasWaves() const {
         return reinterpret_cast<const kernel::CrtScene*>(blob_.data())->integrator == CRT_INTEGRATOR_PATH;
     }
@@ -106,8 +108,9 @@ private:
             counts.resize(pixels);
             if (scene.aovs & CRT_AOV_PRIMITIVE) primitives.assign(pixels, CRT_NONE);
         }
-        FilmPointers pointers() {
-            return {sums.data(), counts.data(), primitives.empty() ? nullptr : primitives.data()};
+        FilmPointers pointers(std::vector<std::uint64_t>& splats) {
+            return {sums.data(), counts.data(), primitives.empty() ? nullptr : primitives.data(),
+                    splats.empty() ? nullptr : splats.data()};
         }
 
         std::vector<double> sums;
@@ -121,7 +124,7 @@ private:
     LaunchPacer pacer_{0.05, 4096, 8};
     std::vector<Line> blob_;
     HostFilm film_, slices_;
-    std::vector<std::uint64_t> rays_;
+    std::vector<std::uint64_t> splats_, rays_;
     double render_seconds_ = 0;
     std::uint64_t paths_ = 0, launches_ = 0;
 };

@@ -108,6 +108,8 @@ public:
         std::copy(sums_.begin(), sums_.end(), film.sums);
         std::copy(counts_.begin(), counts_.end(), film.counts);
         if (film.primitives != nullptr) std::copy(primitives_.begin(), primitives_.end(), film.primitives);
+        if (film.splats != nullptr)
+            std::fill_n(film.splats, counts_.size() * crt::kernel::crt_splat_words(&scene_), 0);
         if (wantedFault() == "nan_film")
             film.sums[sums_.size() / 2] = std::numeric_limits<double>::quiet_NaN();
         if (wantedFault() == "count_film") film.counts[0] += 1;

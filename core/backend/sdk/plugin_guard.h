@@ -276,7 +276,7 @@ private:
             self.film_ = FilmShape{};  // until the integrator has the new scene as a whole
             self.integrator_.setScene(blob);
             self.film_ = {header.width, header.height, header.channels,
-                          (header.aovs & CRT_AOV_PRIMITIVE) != 0};
+                          (header.aovs & CRT_AOV_PRIMITIVE) != 0, (header.aovs & CRT_AOV_SPLATS) != 0};
             return CRT_OK;
         });
     }
@@ -308,6 +308,10 @@ private:
                 throw PluginError(CRT_INVALID_ARGUMENT,
                                   "the film view has primitives, but the scene does not request them");
             }
+            if ((view.splats != nullptr) != self.film_.splats) {
+                throw PluginError(CRT_INVALID_ARGUMENT,
+                                  "the film view must have splats where the scene does, and nowhere else");
+            }
             self.integrator_.readFilm(view);
             return CRT_OK;
         });
@@ -334,7 +338,7 @@ private:
     /// Of the scene that the integrator has; no channels before there is one.
     struct FilmShape {
         std::uint32_t width = 0, height = 0, channels = 0;
-        bool primitives = false;
+        bool primitives = false, splats = false;
     };
 
     I integrator_;

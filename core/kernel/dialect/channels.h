@@ -10,8 +10,8 @@
  * crt_first_hit_<stem> in film.h, SAMPLES is added by crt_film_add_sample.
  *
  * CRT_PLANE_LIST(P) calls P(bit, NAME, Name, TYPE, SOURCE, "name in scenes", "EXR channels") for each
- * output without film channels: IDS is the film's plane of primitive ids, FILM is made of the film when it
- * is resolved. TYPE is FLOAT or UINT.
+ * output without film channels: IDS is the film's plane of primitive ids, SPLATS that of splats, FILM is
+ * made of the film when it is resolved. TYPE is FLOAT or UINT.
  *
  * A spectral film has its bins and the responses of its sensors behind all of these: CrtSpectralFilm.
  *
@@ -32,6 +32,7 @@
     P(3, PRIMITIVE, Primitive, UINT, IDS, "primitive", "id.primitive")                             \
     P(4, VARIANCE, Variance, FLOAT, FILM, "variance", "Variance.Y")                                \
     P(5, SAMPLES, Samples, UINT, FILM, "samples", "sampleCount")                                   \
+    P(9, SPLATS, Splats, UINT, SPLATS, "", "")                                                     \
     P(7, ERROR, Error, FLOAT, FILM, "error", "StdError.Y")
 
 #define CRT_CHANNEL_ENUM(bit, NAME, Name, stem, width, SOURCE, name, exr) CRT_AOV_##NAME = 1 << bit,
@@ -42,6 +43,12 @@ enum CrtAov { CRT_CHANNEL_LIST(CRT_CHANNEL_ENUM) CRT_PLANE_LIST(CRT_PLANE_ENUM) 
    variance.
  */
 #define CRT_CHANNELS_BASE 3u
+
+/* A pixel of the plane of splats (film/splat.h): sums of two words each, the low one first: X, Y of
+   replicate 0, Z, then Y of the other replicates. Behind them stands the number
+   of splats that were left out. */
+#define CRT_SPLAT_SUM_OF(replicate) ((replicate) == 0u ? 1u : 2u + (replicate))
+#define CRT_SPLAT_WORDS(replicates) (2u * (2u + (replicates)) + 1u)
 
 /* Of a film with everything. */
 #define CRT_CHANNEL_WIDTH(bit, NAME, Name, stem, width, SOURCE, name, exr) +(width)

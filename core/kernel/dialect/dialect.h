@@ -30,6 +30,17 @@ typedef int i32;
 typedef ulong u64;
 typedef float f32;
 typedef double f64;
+/* Adds n to a word that other threads add to as well. Returns the carry: 1 if the sum has passed 2^64. The
+   order of threads decides which of them gets a carry, not how many carries there are. OpenCL 1.2 promises
+   atomics of 32 bits only: a word is two halves, low first. */
+CRT_FN u32 crt_atomic_carry(CRT_GLOBAL u64 *word, u64 n) {
+    volatile CRT_GLOBAL u32 *halves = (volatile CRT_GLOBAL u32 *)word;
+    const u32 low = (u32)n;
+    const u32 carry = (u32)(atomic_add(&halves[0], low) + low) < low ? 1u : 0u;
+    const u32 high = (u32)(n >> 32) + carry;
+    if (high == 0u) return carry;
+    return (u32)(atomic_add(&halves[1], high) + high) < high ? 1u : 0u;
+}
 typedef float3 vec3;
 typedef float4 vec4;
 #define CRT_BYTE uchar
@@ -185,6 +196,7 @@ CRT_FN f32 crt_fast_reciprocal(f32 x) {
     return r;
 }
 #endif
+CRT_FN u32 crt_atomic_carry(u64 *word, u64 n) { return atomicAdd(word, n) + n < n ? 1u : 0u; }
 CRT_FN bool crt_is_finite(f32 x) { return (crt_bits(x) & 0x7f800000u) != 0x7f800000u; }
 CRT_FN vec4 crt_load4(const f32 *p) { return *reinterpret_cast<const vec4 *>(p); }
 CRT_SHARED_FN vec4 crt_sqrt4(vec4 v) {
@@ -282,6 +294,9 @@ CRT_FN vec4 operator/(vec4 a, vec4 b) { return vec4{a.v / b.v}; }
 CRT_FN vec4 operator*(vec4 a, f32 s) { return vec4{a.v * s}; }
 CRT_FN vec4 operator*(f32 s, vec4 a) { return vec4{s * a.v}; }
 CRT_FN vec4 operator/(vec4 a, f32 s) { return vec4{a.v / s}; }
+CRT_FN u32 crt_atomic_carry(u64 *word, u64 n) {
+    return __atomic_fetch_add(word, n, __ATOMIC_RELAXED) + n < n ? 1u : 0u;
+}
 CRT_FN f32 crt_fma(f32 a, f32 b, f32 c) { return __builtin_fmaf(a, b, c); }
 CRT_FN f32 crt_sqrt(f32 x) { return __builtin_sqrtf(x); }
 CRT_FN f32 crt_abs(f32 x) { return __builtin_fabsf(x); }

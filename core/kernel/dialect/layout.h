@@ -525,8 +525,15 @@ typedef struct CrtScene {
     u32 camera_media;            /* list of the media around the camera */
     CrtSpan patches;             /* CrtPatch, all triangles; only for brute force */
     CrtSpan occluder_patches;    /* CrtPatch: the triangles that can come between two points of the scene */
+    f64 splat_scale;             /* units of a splat's sum in 1: a power of two; 0: the film takes none */
+    u32 reserved[2];
 } CrtScene;
-CRT_ASSERT_SIZE(CrtScene, 464);
+CRT_ASSERT_SIZE(CrtScene, 480);
+
+/* Words of a pixel in the plane of splats; 0: the film takes none. */
+CRT_FN u32 crt_splat_words(CRT_GLOBAL const CrtScene *scene) {
+    return (scene->aovs & CRT_AOV_SPLATS) != 0u ? CRT_SPLAT_WORDS(1u << scene->replicate_shift) : 0u;
+}
 
 CRT_KERNEL_END
 

@@ -26,12 +26,14 @@ typedef struct CrtFilmPixel {
     CRT_GLOBAL f64 *pairs;     /* the pixel's channels */
     CRT_GLOBAL u64 *count;
     CRT_GLOBAL u32 *primitive; /* may be null */
+    CRT_GLOBAL u64 *splats;    /* of all pixels (splat.h); may be null */
 } CrtFilmPixel;
 
-/* `sums`, `counts` and `primitives` as in CrtFilmView, for the whole film; `primitives` may be null. */
+/* `sums`, `counts`, `primitives` and `splats` as in CrtFilmView, for the whole film; `primitives` and
+   `splats` may be null. */
 CRT_FN CrtFilmPixel crt_film_pixel(const CrtContext *ctx, u32 x, u32 y, u64 first_sample,
                                    CRT_GLOBAL f64 *sums, CRT_GLOBAL u64 *counts,
-                                   CRT_GLOBAL u32 *primitives) {
+                                   CRT_GLOBAL u32 *primitives, CRT_GLOBAL u64 *splats) {
     const u64 index = (u64)y * ctx->scene->width + x;
     CrtFilmPixel pixel;
     pixel.first_sample = first_sample;
@@ -40,6 +42,7 @@ CRT_FN CrtFilmPixel crt_film_pixel(const CrtContext *ctx, u32 x, u32 y, u64 firs
     pixel.count = counts + index;
     pixel.primitive = primitives;
     if (primitives != 0) pixel.primitive += index;
+    pixel.splats = splats;
     return pixel;
 }
 

@@ -89,7 +89,9 @@ CRT_FN int crt_path_advance_passing(const CrtContext *ctx, CrtPath *path, CrtRay
 
 /* Traces the path's ray to its next vertex, shades it and resolves its shadow ray. Returns 0 when the path
    has ended. */
-CRT_FN int crt_path_advance(const CrtContext *ctx, CrtPath *path, CrtRayCount *rays) {
+CRT_FN int crt_path_advance(const CrtContext *ctx, CrtPath *path, const CrtFilmPixel *film,
+                            CrtRayCount *rays) {
+    (void)film;
     if (CRT_HAS(OPACITY) || CRT_HAS(THIN_DIELECTRIC)) return crt_path_advance_passing(ctx, path, rays);
     CrtShadow shadow;
     rays->closest += 1u;

@@ -21,7 +21,9 @@ CRT_FN vec4 crt_srgb_to_xyz(f32 r, f32 g, f32 b) {
    its colour, as XYZ, takes the place of the path's radiance. */
 
 /* Shading normals as colours. */
-CRT_FN int crt_normals_advance(const CrtContext *ctx, CrtPath *path, CrtRayCount *rays) {
+CRT_FN int crt_normals_advance(const CrtContext *ctx, CrtPath *path, const CrtFilmPixel *film,
+                               CrtRayCount *rays) {
+    (void)film;
     rays->closest += 1u;
     const CrtHit hit = crt_trace_closest(ctx, path->ray);
     if (hit.slot == CRT_NONE) return 0;
@@ -43,7 +45,9 @@ CRT_FN vec4 crt_normals_end(const CrtContext *ctx, const CrtPath *path) {
 
 /* The objects' bounding boxes: a colour for each object, in one of three shades by the axis of the face that
    the ray meets. */
-CRT_FN int crt_aabb_advance(const CrtContext *ctx, CrtPath *path, CrtRayCount *rays) {
+CRT_FN int crt_aabb_advance(const CrtContext *ctx, CrtPath *path, const CrtFilmPixel *film,
+                            CrtRayCount *rays) {
+    (void)film;
     rays->closest += 1u;
     CRT_GLOBAL const CrtObject *objects = CRT_ARRAY(CrtObject, ctx->blob, ctx->scene->objects);
     const CrtSlab slab = crt_slab(path->ray);

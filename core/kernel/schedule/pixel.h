@@ -19,16 +19,16 @@ typedef struct CrtPixelWork {
     CrtPath path;
 } CrtPixelWork;
 
-/* `sums`, `counts` and `primitives` as crt_film_pixel takes them. */
+/* `sums`, `counts`, `primitives` and `splats` as crt_film_pixel takes them. */
 CRT_FN CrtPixelWork crt_pixel_begin(const CrtContext *ctx, u32 x, u32 y, u64 first_sample, u32 sample_count,
                                     CRT_GLOBAL f64 *sums, CRT_GLOBAL u64 *counts,
-                                    CRT_GLOBAL u32 *primitives) {
+                                    CRT_GLOBAL u32 *primitives, CRT_GLOBAL u64 *splats) {
     CrtPixelWork work;
     work.x = x;
     work.y = y;
     work.sample_count = sample_count;
     work.alive = 0;
-    work.film = crt_film_pixel(ctx, x, y, first_sample, sums, counts, primitives);
+    work.film = crt_film_pixel(ctx, x, y, first_sample, sums, counts, primitives, splats);
     return work;
 }
 
@@ -49,7 +49,7 @@ CRT_FN void crt_begin_sample(const CrtContext *ctx, CrtPixelWork *work) {
 CRT_FN int crt_pixel_vertex(const CrtContext *ctx, CrtPixelWork *work, CrtRayCount *rays) {
     if (work->film.done >= work->sample_count) return 0;
     if (!work->alive) crt_begin_sample(ctx, work);
-    work->alive = crt_integrator_advance(ctx, &work->path, rays);
+    work->alive = crt_integrator_advance(ctx, &work->path, &work->film, rays);
     if (!work->alive) crt_add_sample(ctx, work);
     return 1;
 }
@@ -63,13 +63,14 @@ CRT_FN void crt_pixel_end(CrtPixelWork *work) { crt_film_end(&work->film); }
    docs/decisions/0039-what-a-lane-does-when-its-path-ends.md). */
 CRT_FN void crt_render_pixel(const CrtContext *ctx, u32 x, u32 y, u64 first_sample, u32 sample_count,
                              CRT_GLOBAL f64 *sums, CRT_GLOBAL u64 *counts, CRT_GLOBAL u32 *primitives,
-                             CrtRayCount *rays) {
-    CrtPixelWork work = crt_pixel_begin(ctx, x, y, first_sample, sample_count, sums, counts, primitives);
+                             CRT_GLOBAL u64 *splats, CrtRayCount *rays) {
+    CrtPixelWork work =
+        crt_pixel_begin(ctx, x, y, first_sample, sample_count, sums, counts, primitives, splats);
     const int waits = CRT_HAS(VIEW) ? 0 : CRT_HAS(BVH);
     if (waits) {
         while (work.film.done < work.sample_count) {
             crt_begin_sample(ctx, &work);
-            while (crt_integrator_advance(ctx, &work.path, rays)) continue;
+            while (crt_integrator_advance(ctx, &work.path, &work.film, rays)) continue;
             crt_add_sample(ctx, &work);
         }
     } else {

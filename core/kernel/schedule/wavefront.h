@@ -4,7 +4,7 @@
  * traces the ray that each slot waits for and sorts the slots by the kind of material that they have met;
  * then each kind is shaded by a kernel that holds that kind alone. Between kernels a path lies in rows of
  * 16 bytes, a row of all slots after another. A slot computes what crt_render_pixel computes, and adds it
- * to the film in the same order.
+ * to the film in the same order. It knows the path tracer alone, which does not splat.
  */
 #ifndef CRT_WAVEFRONT_H
 #define CRT_WAVEFRONT_H
@@ -35,7 +35,7 @@ CRT_FN int crt_wave_next_sample(const CrtContext *ctx, const CrtWave *wave, u32 
     CrtPixelWork work = crt_pixel_begin(
         ctx, share.x, share.y, wave->first_sample + share.first, share.count,
         wave->sums + film * scene->channels * 2u, wave->counts + film,
-        wave->primitives != 0 ? wave->primitives + film : 0);
+        wave->primitives != 0 ? wave->primitives + film : 0, 0);
     if (!first_pass) {
         work.film.done = wave->done[slot];
         work.film.valid = wave->valid[slot];

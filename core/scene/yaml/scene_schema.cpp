@@ -350,7 +350,9 @@ SectionSchema integrator() {
                  .kind = Kind::Choice,
                  .choices = types,
                  .fallback = yaml(types, d.type),
-                 .doc = "Path tracing, or an image of shading normals or bounding boxes for debugging."},
+                 .doc = "Path tracing, or an image of shading normals or bounding boxes for debugging. "
+                        "`splat_test` is a test of films: it throws samples onto random pixels, and its "
+                        "image is a ramp of colours."},
                 {.name = "max_depth",
                  .kind = Kind::Integer,
                  .range = {0, 1e9, false, false},
