@@ -153,7 +153,7 @@ CrtVertex SurfacePoints::vertexOf(const CrtSurface& surface, std::uint32_t slot,
 bool SurfacePoints::mirrors(const CrtVertex& vertex, CrtSampler& sampler) const {
     const vec4 kFirstIsHero = make_vec4(1, 0, 0, 0);
     for (std::uint32_t k = 0; k < kSamplesOfBsdf; ++k) {
-        const std::uint32_t dimension = CRT_DIM_VERTEX + CRT_DIM_PER_VERTEX * (k + 1);
+        const std::uint32_t dimension = crt_vertex_dimension(k + 1);
         const CrtScatter scatter =
             crt_vertex_sample(&vertex, crt_sample_2d(&sampler, dimension + CRT_DIM_BSDF),
                               crt_sample_2d(&sampler, dimension + CRT_DIM_CHOICE), kFirstIsHero, 0,
@@ -210,11 +210,11 @@ std::pair<std::optional<LitPath>, std::optional<LitPath>> SurfacePoints::light(c
     surface.medium = 0;
     surface.touches = 0;
     surface.material = crt_chosen_material(&context_, &surface, -surface.ns, &sampler,
-                                           CRT_DIM_VERTEX + CRT_DIM_MIX);
-    const CrtRandom2 u = crt_sample_2d(&sampler, CRT_DIM_VERTEX + CRT_DIM_BSDF);
+                                           crt_vertex_dimension(0) + CRT_DIM_MIX);
+    const CrtRandom2 u = crt_sample_2d(&sampler, crt_vertex_dimension(0) + CRT_DIM_BSDF);
     CrtVertex vertex =
         vertexOf(surface, hit.slot, crt_cosine_direction(surface.ns, u), wavelengths.position);
-    const CrtDirectSample offer = crt_direct_sample(&context_, &sampler, CRT_DIM_VERTEX, &vertex);
+    const CrtDirectSample offer = crt_direct_sample(&context_, &sampler, crt_vertex_dimension(0), &vertex);
     if (!(offer.irradiance > 0)) return {};
     const std::optional<LitPath> from_anywhere =
         carry(vertex, offer, scattered(vertex, offer), wavelengths);

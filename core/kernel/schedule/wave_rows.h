@@ -261,7 +261,8 @@ CRT_FN CrtPassage crt_load_passage(const CrtContext *ctx, const CrtWave *wave, u
     const vec4 carried = *crt_row(wave, shadow ? CRT_ROW_SHADOW_RADIANCE : CRT_ROW_THROUGHPUT, slot);
     const vec4 position =
         crt_has_panes(ctx) ? *crt_row(wave, CRT_ROW_WAVELENGTHS, slot) : splat4(0.0f);
-    CrtPassage way = crt_passage(depth, shadow, crt_row_vector(direction), position, media, carried);
+    CrtPassage way = crt_passage(CRT_PASSING_DIMENSION(depth, shadow), shadow, crt_row_vector(direction),
+                                 position, media, carried);
     if ((state & CRT_WAVE_PASSED) != 0u) {
         const vec4 passed = *crt_row(wave, CRT_ROW_PASSED, slot);
         way.passed = crt_bits(V4W(passed));

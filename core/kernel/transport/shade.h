@@ -63,7 +63,7 @@ CRT_FN int crt_shade(const CrtContext *ctx, CrtPath *path, CrtHit hit, CrtShadow
         crt_add_distant_emission(ctx, path);
         return 0;
     }
-    const u32 dimension = CRT_DIM_VERTEX + CRT_DIM_PER_VERTEX * path->depth;
+    const u32 dimension = crt_vertex_dimension(path->depth);
     CrtVertex vertex;
     CrtSurface *surface = &vertex.surface;
     vertex.surface = crt_surface(ctx, hit);
