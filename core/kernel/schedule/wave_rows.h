@@ -62,11 +62,11 @@ typedef struct CrtWave {
     CRT_GLOBAL u64 *counts;
     CRT_GLOBAL u32 *primitives;
     CRT_GLOBAL u64 *rays;     /* pairs of counters */
-    u32 queue_of_kind[32];    /* by CRT_MATERIAL_… */
+    u32 queue_of_kind[CRT_MATERIAL_NUMBERS]; /* by CRT_MATERIAL_… */
     u32 queue_of_choice;      /* whose slots go on to other queues, or are traced on (crt_wave_choose) */
     u32 queue_of_miss;        /* CRT_NONE: nothing shines there */
 } CrtWave;
-CRT_ASSERT_SIZE(CrtWave, 264);
+CRT_ASSERT_SIZE(CrtWave, 392);
 
 /* Words of 4 bytes that slots and queues take besides the rows. */
 #define CRT_WAVE_WORDS(slots, queues) ((slots) * (3u + (queues)) + 2u * CRT_WAVE_QUEUES + 1u)

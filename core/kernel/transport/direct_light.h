@@ -119,9 +119,9 @@ CRT_FN CrtDirectSample crt_direct_sample(const CrtContext *ctx, CrtSampler *samp
     return direct;
 }
 
-/* Probability with which scattering finds a direct-lighting sample, over that of light sampling. Those of an
-   emitter are per area (crt_add_emission): of a ray scattered at the shadow ray's origin pdf·|n·d|/|d|³, of
-   light sampling pdf·cos/distance². */
+/* Probability with which scattering finds a direct-lighting sample, over that of light sampling. Those of
+   an emitter are per area (crt_add_emission): of a ray scattered at the shadow ray's origin
+   pdf·|n·d|/|d|³, of light sampling pdf·cos/distance². */
 CRT_FN f32 crt_direct_ratio(const CrtDirectSample *direct, const CrtVertex *vertex, CrtRay ray) {
     const f32 squared = dot3(ray.d, ray.d);
     const vec3 towards = direct->area ? ray.d * (1.0f / crt_sqrt(squared)) : direct->wi;

@@ -89,8 +89,7 @@ CRT_FN u32 crt_vertex_media(const CrtContext *ctx, const CrtVertex *vertex, vec3
 /* The cosine by which the BSDF weighs light along w. Lambert's light has that of shading_normal.h, raised
    light included; a facet has those of all its ways (normal_map.h). */
 CRT_FN f32 crt_shading_cosine(const CrtBsdf *b, vec3 w) {
-    const int raises = b->type == CRT_MATERIAL_DIFFUSE || b->type == CRT_MATERIAL_PLASTIC;
-    if (!raises && !crt_is_facet(b)) return crt_abs(dot3(w, b->ns));
+    if ((b->flags & CRT_BSDF_RAISES) == 0u && !crt_is_facet(b)) return crt_abs(dot3(w, b->ns));
     f32 sum = 0.0f;
     const u32 ways = CRT_HAS(NORMAL_MAP) ? crt_ways(b, w) : 1u;
     CRT_ROLLED for (u32 way = 0u; way < ways; ++way)
@@ -133,10 +132,7 @@ CRT_FN CrtScatter crt_vertex_sample(const CrtVertex *vertex, CrtRandom2 u, CrtRa
 }
 
 /* True if crt_vertex_sample reads its second pair of random numbers. */
-CRT_FN int crt_vertex_chooses(const CrtVertex *vertex) {
-    return (CRT_HAS(ROUGH_DIELECTRIC) || CRT_HAS(PLASTIC)) &&
-           (vertex->bsdf.flags & CRT_BSDF_CHOOSES) != 0u;
-}
+CRT_FN int crt_vertex_chooses(const CrtVertex *vertex) { return crt_chooses(&vertex->bsdf); }
 
 CRT_KERNEL_END
 
