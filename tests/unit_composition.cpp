@@ -66,7 +66,8 @@ struct Sheet {
         const CrtSurface surface = crt_surface(&ctx, hit);
         CrtSampler sampler = samplerAt(sample);
         const char* const names[] = {"a", "b", "c", "glass", "veil"};
-        return names[crt_chosen_material(&ctx, &surface, d, &sampler, CRT_DIM_VERTEX + CRT_DIM_MIX)];
+        const u32 dimension = crt_vertex_dimension(0) + CRT_DIM_MIX;
+        return names[crt_chosen_material(&ctx, &surface, d, &sampler, dimension)];
     }
     /// Of 2^14 samples, the share that finds this material.
     double share(const std::string& material, const vec3& d) const {
@@ -127,7 +128,8 @@ TEST_CASE("opacity: rays pass as often as it says, and go on behind the surface"
             ray.o = make_vec3(-0.25f, -0.5f, 1);
             ray.d = kFromFront;
             ray.reach = CRT_INFINITY;
-            CrtPassage way = crt_passage(0, 0, kFromFront, splat4(0), 0u, splat4(1));
+            CrtPassage way =
+                crt_passage(CRT_PASSING_DIMENSION(0, 0), 0, kFromFront, splat4(0), 0u, splat4(1));
             way.passed = static_cast<u32>(i & 7);
             if (!crt_passes(&ctx, sheet.hit, &sampler, &way, &ray)) {
                 ++stopped;

@@ -118,9 +118,8 @@ LightBounds boundsOfShape(const FlatScene& flat, std::size_t id, bool two_sided,
 /// Nothing for lights that lie nowhere, and beams, which light what is in them alone.
 std::optional<LightBounds> boundsOfPoint(const PointLight& light, const kernel::CrtPointLight& compiled,
                                          double power) {
+    if (!shinesFromPoint(light.type)) return std::nullopt;
     const bool spot = light.type == PointLightType::Spot;
-    if (!spot && light.type != PointLightType::Point && light.type != PointLightType::Ies)
-        return std::nullopt;
     constexpr double kDegree = std::numbers::pi / 180;
     LightBounds bounds;
     for (std::size_t k = 0; k < 3; ++k)

@@ -18,11 +18,6 @@ bool isAtInfinity(PointLightType type) {
     return type == PointLightType::Directional || type == PointLightType::Sun;
 }
 
-/// True if its strength is an intensity, which is per solid angle.
-bool shinesFromPoint(PointLightType type) {
-    return type == PointLightType::Point || type == PointLightType::Spot || type == PointLightType::Ies;
-}
-
 [[noreturn]] void refuse(const PointLight& light, const char* why) {
     throw Error(ErrorKind::Scene, fmt::format("the light '{}' is {} for single precision", light.name, why),
                 light.place);

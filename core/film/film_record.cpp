@@ -167,38 +167,10 @@ SceneTrait geometryTrait(const Scene& scene) {
 
 // Structured bindings name every member: a new member does not compile until a trait contains it.
 
-void addClearcoat(Digest& digest, const Clearcoat& coat) {
-    const auto& [ior, roughness, depth, darkening, base_roughness] = coat;
-    for (const double number : {ior, roughness, darkening, base_roughness}) digest.add(number);
-    digest.add(depth);
-}
-
-void addMaterial(Digest& digest, const Material& material) {
-    const auto& [name, type, reflectance, eta, k, absorption, roughness, by_color, edge_tint, weight,
-                 anisotropy, anisotropy_rotation_deg, film_thickness_nm, film_index, reflectance_texture,
-                 roughness_texture, film_texture, place, opacity, opacity_texture, parts, normal_texture,
-                 normal_strength, amount, amount_texture, emission, diffuse_roughness, fuzz, fuzz_color,
-                 fuzz_roughness, clearcoat] = material;
-    digest.add(type);
-    digest.add(by_color);
-    for (const Spectrum* spectrum : {&reflectance, &eta, &k, &edge_tint, &film_index, &fuzz_color})
-        digest.add(*spectrum);
-    for (const double number : {roughness, weight, anisotropy, anisotropy_rotation_deg, film_thickness_nm,
-                                opacity, normal_strength, amount, diffuse_roughness, fuzz, fuzz_roughness})
-        digest.add(number);
-    for (const TextureIndex texture : {reflectance_texture, roughness_texture, film_texture, opacity_texture,
-                                       normal_texture, amount_texture})
-        digest.add(texture);
-    for (const std::int32_t index : {parts[0], parts[1], emission}) digest.add(index);
-    digest.add(absorption.has_value());
-    if (absorption) digest.add(*absorption);
-    digest.add(clearcoat.has_value());
-    if (clearcoat) addClearcoat(digest, *clearcoat);
-}
-
 SceneTrait materialsTrait(const Scene& scene) {
     Digest digest;
-    for (const Material& material : scene.materials) addMaterial(digest, material);
+    for (const Material& material : scene.materials)
+        visitMembers(material, [&digest](const auto& member) { digest.add(member); });
     return {"the materials", counted(scene.materials.size(), "material", "materials"), digest.digits()};
 }
 

@@ -60,12 +60,11 @@ public:
 
 private:
     CrtHit hitOf(std::uint32_t slot, std::uint32_t instance, std::uint32_t number) const;
-    void prepare(CrtSurface surface, std::uint32_t slot, vec3 wo, vec4 position, CrtBsdf& bsdf) const;
-    bool mirrors(const CrtBsdf& bsdf, CrtSampler& sampler) const;
-    vec4 mirrored(const CrtBsdf& bsdf, const CrtDirectSample& offer, CrtSampler& sampler) const;
-    std::optional<LitPath> carry(const CrtSurface& surface, const CrtBsdf& bsdf,
-                                 const CrtDirectSample& offer,
-                                 vec4 share, const CrtWavelengths& wavelengths) const;
+    CrtVertex vertexOf(const CrtSurface& surface, std::uint32_t slot, vec3 wo, vec4 position) const;
+    bool mirrors(const CrtVertex& vertex, CrtSampler& sampler) const;
+    vec4 mirrored(const CrtVertex& vertex, const CrtDirectSample& offer, CrtSampler& sampler) const;
+    std::optional<LitPath> carry(const CrtVertex& vertex, const CrtDirectSample& offer, vec4 share,
+                                 const CrtWavelengths& wavelengths) const;
     bool occludes(const CrtRay& ray) const;
 
     CrtContext context_{};
@@ -141,48 +140,51 @@ std::vector<CrtHit> SurfacePoints::choose() const {
     return hits;
 }
 
-/// As crt_shade prepares it.
-void SurfacePoints::prepare(CrtSurface surface, std::uint32_t slot, vec3 wo, vec4 position,
-                            CrtBsdf& bsdf) const {
-    bsdf.pane_cosine = crt_pane_cosine(&surface, -wo);
-    crt_map_normal(&context_, &surface, slot, &wo, &bsdf);
-    crt_layered_prepare(&context_, &bsdf, &surface, wo, position, splat4(1), 0);
+CrtVertex SurfacePoints::vertexOf(const CrtSurface& surface, std::uint32_t slot, vec3 wo,
+                                  vec4 position) const {
+    CrtVertex vertex;
+    vertex.surface = surface;
+    vertex.wo = wo;
+    crt_vertex_prepare(&context_, &vertex, slot, position, splat4(1), 0, 0);
+    return vertex;
 }
 
-/// True if the BSDF scatters part of the light into a single direction.
-bool SurfacePoints::mirrors(const CrtBsdf& bsdf, CrtSampler& sampler) const {
+/// True if the vertex scatters part of the light into a single direction.
+bool SurfacePoints::mirrors(const CrtVertex& vertex, CrtSampler& sampler) const {
     const vec4 kFirstIsHero = make_vec4(1, 0, 0, 0);
     for (std::uint32_t k = 0; k < kSamplesOfBsdf; ++k) {
-        const std::uint32_t dimension = CRT_DIM_VERTEX + CRT_DIM_PER_VERTEX * (k + 1);
+        const std::uint32_t dimension = crt_vertex_dimension(k + 1);
         const CrtScatter scatter =
-            crt_surface_sample(&bsdf, crt_sample_2d(&sampler, dimension + CRT_DIM_BSDF),
-                               crt_sample_2d(&sampler, dimension + CRT_DIM_CHOICE), kFirstIsHero, 0);
+            crt_vertex_sample(&vertex, crt_sample_2d(&sampler, dimension + CRT_DIM_BSDF),
+                              crt_sample_2d(&sampler, dimension + CRT_DIM_CHOICE), kFirstIsHero, 0,
+                              CRT_RADIANCE);
         if (scatter.valid && scatter.pdf == 0) return true;
     }
     return false;
 }
 
 /// The factor on the light's spectrum that crt_sample_lights computes.
-vec4 scattered(const CrtBsdf& bsdf, const CrtDirectSample& offer) {
-    return crt_is_delta(&bsdf) ? splat4(0) : crt_surface_eval(&bsdf, offer.wi) * offer.irradiance;
+vec4 scattered(const CrtVertex& vertex, const CrtDirectSample& offer) {
+    if (crt_vertex_is_delta(&vertex)) return splat4(0);
+    return crt_vertex_eval(&vertex, offer.wi, CRT_RADIANCE) * offer.irradiance;
 }
 
 /// The same for a path that arrives from the mirror direction of the light. If scattered rays can also reach
 /// the light, the path carries at most its radiance. The cosine compensates for grazing angles, where paths
 /// are brighter and proportionally rarer.
-vec4 SurfacePoints::mirrored(const CrtBsdf& bsdf, const CrtDirectSample& offer, CrtSampler& sampler) const {
-    vec4 share = scattered(bsdf, offer);
+vec4 SurfacePoints::mirrored(const CrtVertex& vertex, const CrtDirectSample& offer,
+                             CrtSampler& sampler) const {
+    vec4 share = scattered(vertex, offer);
     if (offer.pdf > 0) {
         const vec4 whole = splat4(offer.irradiance * offer.pdf);
         const bool by_chance_alone = context_.scene->nee == CRT_NEE_NONE && max4(share) > 0;
-        share = by_chance_alone || mirrors(bsdf, sampler) ? whole : crt_min4(share, whole);
+        share = by_chance_alone || mirrors(vertex, sampler) ? whole : crt_min4(share, whole);
     }
-    return share * crt_abs(dot3(bsdf.wo, bsdf.ns));
+    return share * crt_abs(dot3(vertex.bsdf.wo, vertex.bsdf.ns));
 }
 
-std::optional<LitPath> SurfacePoints::carry(const CrtSurface& surface, const CrtBsdf& bsdf,
-                                            const CrtDirectSample& offer, vec4 share,
-                                            const CrtWavelengths& wavelengths) const {
+std::optional<LitPath> SurfacePoints::carry(const CrtVertex& vertex, const CrtDirectSample& offer,
+                                            vec4 share, const CrtWavelengths& wavelengths) const {
     const auto* lights = CRT_ARRAY(CrtLight, context_.blob, context_.scene->lights);
     const vec4 position = wavelengths.position,
                light = offer.environment
@@ -192,7 +194,8 @@ std::optional<LitPath> SurfacePoints::carry(const CrtSurface& surface, const Crt
     if (!(luminance > 0) || !std::isfinite(luminance)) return std::nullopt;
     CrtRay ray;
     const bool far = offer.distance == CRT_INFINITY;
-    ray.o = crt_offset_origin(surface.p, surface.clearance, crt_side(&bsdf), offer.wi);
+    const CrtSurface& surface = vertex.surface;
+    ray.o = crt_offset_origin(surface.p, surface.clearance, crt_vertex_side(&vertex), offer.wi);
     ray.d = far ? offer.wi : offer.point - ray.o;
     ray.reach = far ? CRT_INFINITY : offer.reach;
     return LitPath{luminance, ray};
@@ -207,17 +210,17 @@ std::pair<std::optional<LitPath>, std::optional<LitPath>> SurfacePoints::light(c
     surface.medium = 0;
     surface.touches = 0;
     surface.material = crt_chosen_material(&context_, &surface, -surface.ns, &sampler,
-                                           CRT_DIM_VERTEX + CRT_DIM_MIX);
-    CrtBsdf bsdf;
-    const CrtRandom2 u = crt_sample_2d(&sampler, CRT_DIM_VERTEX + CRT_DIM_BSDF);
-    prepare(surface, hit.slot, crt_cosine_direction(surface.ns, u), wavelengths.position, bsdf);
-    const CrtDirectSample offer = crt_direct_sample(&context_, &sampler, CRT_DIM_VERTEX, surface.p, &bsdf);
+                                           crt_vertex_dimension(0) + CRT_DIM_MIX);
+    const CrtRandom2 u = crt_sample_2d(&sampler, crt_vertex_dimension(0) + CRT_DIM_BSDF);
+    CrtVertex vertex =
+        vertexOf(surface, hit.slot, crt_cosine_direction(surface.ns, u), wavelengths.position);
+    const CrtDirectSample offer = crt_direct_sample(&context_, &sampler, crt_vertex_dimension(0), &vertex);
     if (!(offer.irradiance > 0)) return {};
     const std::optional<LitPath> from_anywhere =
-        carry(surface, bsdf, offer, scattered(bsdf, offer), wavelengths);
-    const vec3 side = dot3(offer.wi, bsdf.ns) < 0 ? -bsdf.ns : bsdf.ns;
-    prepare(surface, hit.slot, crt_reflect(offer.wi, side), wavelengths.position, bsdf);
-    return {carry(surface, bsdf, offer, mirrored(bsdf, offer, sampler), wavelengths), from_anywhere};
+        carry(vertex, offer, scattered(vertex, offer), wavelengths);
+    const vec3 ns = vertex.bsdf.ns, side = dot3(offer.wi, ns) < 0 ? -ns : ns;
+    vertex = vertexOf(surface, hit.slot, crt_reflect(offer.wi, side), wavelengths.position);
+    return {carry(vertex, offer, mirrored(vertex, offer, sampler), wavelengths), from_anywhere};
 }
 
 bool SurfacePoints::occludes(const CrtRay& ray) const {

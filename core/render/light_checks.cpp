@@ -214,10 +214,9 @@ void warnOfLargeUnits(const Film& film, const Scene& scene) {
     const PointLight* nearest = nullptr;
     double distance = std::numeric_limits<double>::infinity();
     for (const PointLight& light : scene.point_lights) {
-        const bool spreads = light.type == PointLightType::Point || light.type == PointLightType::Spot ||
-                             light.type == PointLightType::Ies;
         const double away = length(light.position - scene.camera.position);
-        if (spreads && light.strength > 0 && away < distance) nearest = &light, distance = away;
+        if (shinesFromPoint(light.type) && light.strength > 0 && away < distance)
+            nearest = &light, distance = away;
     }
     if (nearest == nullptr || distance < kFar) return;
     const double brightest = brightestLuminance(film) * std::exp2(scene.film.exposure_ev);

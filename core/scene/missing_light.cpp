@@ -35,14 +35,12 @@ void note(const Scene& scene, std::int32_t index, SingleDirections& found) {
             (isSmooth(material) ? found.glass : found.scatters) = true;
             break;
         case MaterialType::ThinDielectric: found.panes = true; break;
-        case MaterialType::Mirror:
-        case MaterialType::Conductor: found.metal = true; break;
         case MaterialType::RoughConductor: (isSmooth(material) ? found.metal : found.scatters) = true; break;
         case MaterialType::Plastic:
             found.scatters = true;
             if (isSmooth(material) && material.eta.max() != 1) found.coats = true;
             break;
-        case MaterialType::Diffuse: found.scatters = true; break;
+        default: (scattersLobe(material.type) ? found.scatters : found.metal) = true;
     }
     if (material.clearcoat) (material.clearcoat->roughness < kSmooth ? found.coats : found.scatters) = true;
 }

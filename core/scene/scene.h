@@ -107,6 +107,11 @@ inline constexpr std::pair<MaterialType, const char*> kMaterialNames[] = {
     CRT_MATERIAL_LIST(CRT_MATERIAL_NAME, )
 #undef CRT_MATERIAL_NAME
 };
+/// True if it scatters light to all sides, and not in single directions alone.
+constexpr bool scattersLobe(MaterialType type) {
+    return static_cast<std::uint32_t>(type) < 64 &&
+           (CRT_FEATURES_LOBE >> static_cast<std::uint32_t>(type) & 1) != 0;
+}
 inline constexpr std::pair<MaterialType, const char*> kComposedNames[] = {
     {MaterialType::Mix, "mix"}, {MaterialType::TwoSided, "two_sided"}};
 /// Largest depth of nesting of mixes and two-sided materials.
@@ -182,6 +187,44 @@ struct Material {
     }
 };
 
+/// Numbers that a key of scene files sets, in sections that have the key.
+inline constexpr std::pair<const char*, double Material::*> kMaterialNumbers[] = {
+    {"roughness_anisotropy", &Material::anisotropy},
+    {"anisotropy_rotation_deg", &Material::anisotropy_rotation_deg},
+};
+
+/// Calls visit(member) for the members that decide what a material looks like. Structured bindings name
+/// every member: a new member does not compile until it is here.
+template <class Visit>
+void visitMembers(const Clearcoat& coat, const Visit& visit) {
+    const auto& [ior, roughness, depth, darkening, base_roughness] = coat;
+    for (const double number : {ior, roughness, darkening, base_roughness}) visit(number);
+    visit(depth);
+}
+template <class Visit>
+void visitMembers(const Material& material, const Visit& visit) {
+    const auto& [name, type, reflectance, eta, k, absorption, roughness, by_color, edge_tint, weight,
+                 anisotropy, anisotropy_rotation_deg, film_thickness_nm, film_index, reflectance_texture,
+                 roughness_texture, film_texture, place, opacity, opacity_texture, parts, normal_texture,
+                 normal_strength, amount, amount_texture, emission, diffuse_roughness, fuzz, fuzz_color,
+                 fuzz_roughness, clearcoat] = material;
+    visit(type);
+    visit(by_color);
+    for (const Spectrum* spectrum : {&reflectance, &eta, &k, &edge_tint, &film_index, &fuzz_color})
+        visit(*spectrum);
+    for (const double number : {roughness, weight, anisotropy, anisotropy_rotation_deg, film_thickness_nm,
+                                opacity, normal_strength, amount, diffuse_roughness, fuzz, fuzz_roughness})
+        visit(number);
+    for (const TextureIndex texture : {reflectance_texture, roughness_texture, film_texture, opacity_texture,
+                                       normal_texture, amount_texture})
+        visit(texture);
+    for (const std::int32_t index : {parts[0], parts[1], emission}) visit(index);
+    visit(absorption.has_value());
+    if (absorption) visit(*absorption);
+    visit(clearcoat.has_value());
+    if (clearcoat) visitMembers(*clearcoat, visit);
+}
+
 /// A triangle mesh in object space. Polygons are already triangulated.
 struct Mesh {
     std::vector<Vec3d> positions;
@@ -253,6 +296,11 @@ inline constexpr std::pair<PointLightType, const char*> kPointLightNames[] = {
     {PointLightType::Sun, "sun"},
     {PointLightType::Ies, "ies"},
     {PointLightType::Beam, "beam"}};
+/// True if its strength is an intensity, which is per solid angle.
+constexpr bool shinesFromPoint(PointLightType type) {
+    return type != PointLightType::Directional && type != PointLightType::Sun &&
+           type != PointLightType::Beam;
+}
 
 /// A light without a surface.
 struct PointLight {

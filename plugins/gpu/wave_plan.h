@@ -18,7 +18,7 @@ struct WavePlan {
     /// crt_trace; the shader of queue 0, of queue 1, …; where there are mixes or panes, crt_choose_queue,
     /// whose queue is the last.
     Specs kernels;
-    std::uint32_t queue_of_kind[32] = {};
+    std::uint32_t queue_of_kind[CRT_MATERIAL_NUMBERS] = {};
     std::uint32_t queue_of_choice = CRT_NONE, queue_of_miss = CRT_NONE;
     std::uint32_t queues() const { return static_cast<std::uint32_t>(kernels.size() - 1); }
     /// Queues that are shaded: all but that of choices.

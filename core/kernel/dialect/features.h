@@ -85,6 +85,7 @@ enum CrtFeature : unsigned long { CRT_FEATURE_LIST(CRT_FEATURE_ENUM) };
 #define CRT_SCATTERS_DELTA(bit)
 #define CRT_LOBE_BIT(F, bit, NAME, Name, word, scatter, text) CRT_SCATTERS_##scatter(bit)
 enum CrtMaterialType { CRT_MATERIAL_LIST(CRT_MATERIAL_ENUM, ) };
+#define CRT_MATERIAL_NUMBERS 64 /* above every kind's: it is a bit of a mask */
 #define CRT_FEATURES_MATERIALS (0ul CRT_MATERIAL_LIST(CRT_MATERIAL_BIT, ))
 #define CRT_FEATURES_LOBE (0ul CRT_MATERIAL_LIST(CRT_LOBE_BIT, ))
 

@@ -38,7 +38,8 @@ CRT_FN int crt_path_advance_passing(const CrtContext *ctx, CrtPath *path, CrtRay
     CrtPassage way;
     way.shadow = 0;
     if (passable)
-        way = crt_passage(path->depth, 0, ray.d, path->wavelengths.position, path->media, path->throughput);
+        way = crt_passage(CRT_PASSING_DIMENSION(path->depth, 0), 0, ray.d, path->wavelengths.position,
+                          path->media, path->throughput);
     rays->closest += 1u;
     for (;;) {
         CrtHit hit = crt_no_hit(ray.reach);
@@ -82,7 +83,7 @@ CRT_FN int crt_path_advance_passing(const CrtContext *ctx, CrtPath *path, CrtRay
         way.shadow = 1;
         way.carried = shadow.radiance;
         if (passable)
-            way = crt_passage(depth, 1, ray.d, path->wavelengths.position,
+            way = crt_passage(CRT_PASSING_DIMENSION(depth, 1), 1, ray.d, path->wavelengths.position,
                               CRT_HAS(MEDIA) ? shadow.media : 0u, shadow.radiance);
     }
 }

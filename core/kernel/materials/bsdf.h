@@ -41,7 +41,7 @@ CRT_FN void crt_bsdf_prepare(const CrtContext *ctx, CrtBsdf *b, const CrtSurface
     switch (b->type) {
         case CRT_MATERIAL_DIFFUSE:
             if (CRT_HAS(DIFFUSE)) {
-                b->flags = CRT_BSDF_REFLECTS;
+                b->flags = CRT_BSDF_REFLECTS | CRT_BSDF_RAISES;
                 b->reflectance = crt_value(ctx, material.reflectance, surface, position);
                 if (albedo) b->albedo = b->reflectance;
             }
@@ -138,7 +138,7 @@ CRT_FN void crt_bsdf_prepare(const CrtContext *ctx, CrtBsdf *b, const CrtSurface
                 const f32 roughness = V4X(crt_value(ctx, material.roughness, surface, position));
                 const f32 eta = V4X(crt_value(ctx, material.eta, surface, position));
                 const f32 k = V4X(crt_value(ctx, material.k, surface, position));
-                b->flags = CRT_BSDF_REFLECTS | CRT_BSDF_CHOOSES;
+                b->flags = CRT_BSDF_REFLECTS | CRT_BSDF_CHOOSES | CRT_BSDF_RAISES;
                 b->eta = splat4(eta);
                 b->alpha = roughness * roughness;
                 b->coat = 0;
@@ -172,8 +172,13 @@ CRT_FN CrtScatter crt_sample_smooth(const CrtBsdf *b, vec4 hero, int alone, f32 
                                                     (b->flags & CRT_BSDF_DISPERSIVE) != 0u, alone, u));
 }
 
+/* True if crt_bsdf_sample needs its second pair of random numbers. */
+CRT_FN int crt_chooses(const CrtBsdf *b) {
+    return (CRT_HAS(ROUGH_DIELECTRIC) || CRT_HAS(PLASTIC)) && (b->flags & CRT_BSDF_CHOOSES) != 0u;
+}
+
 /* A direction w_i, distributed as the density of crt_bsdf or a delta. `choice`: two more random numbers,
-   where the flags ask for them. `hero`: 1 in the hero's lane, 0 elsewhere. `alone`: only the hero is
+   where crt_chooses. `hero`: 1 in the hero's lane, 0 elsewhere. `alone`: only the hero is
    alive. */
 CRT_FN CrtScatter crt_bsdf_sample(const CrtBsdf *b, CrtRandom2 u, CrtRandom2 choice, vec4 hero, int alone) {
     (void)choice;

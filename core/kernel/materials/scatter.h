@@ -21,6 +21,7 @@ CRT_KERNEL_BEGIN
 #define CRT_BSDF_FILM 64u      /* under a thin film: reflectances are thin_film.h's */
 #define CRT_BSDF_COLORED 256u  /* a metal of OpenPBR's: reflectances are openpbr.h's */
 #define CRT_BSDF_ANISOTROPIC 128u /* wider along its tangent than across it */
+#define CRT_BSDF_RAISES 512u   /* Lambert's light, which interpolated normals raise (shading_normal.h) */
 
 /* A BSDF without CRT_BSDF_DELTA may still have single directions beside its lobe: crt_bsdf_sample gives
    those the pdf 0, and crt_bsdf is of the lobe alone. */

@@ -11,7 +11,9 @@
 
 CRT_KERNEL_BEGIN
 
-/* Dimensions. Those of path vertex v follow CRT_DIM_VERTEX + CRT_DIM_PER_VERTEX · v. */
+/* Dimensions. Functions that draw numbers for a vertex or for a ray take the base of their dimensions from
+   the caller (crt_vertex_dimension, CRT_PASSING_DIMENSION), so that several subpaths can have separate
+   ones. */
 #define CRT_DIM_FILM 0u
 #define CRT_DIM_WAVELENGTH 1u
 #define CRT_DIM_LENS 2u
@@ -25,13 +27,20 @@ CRT_KERNEL_BEGIN
 #define CRT_DIM_CHOICE 4u       /* which of several ways to scatter; two numbers */
 #define CRT_DIM_MIX 7u          /* which material of a mix */
 
-/* Those of the surfaces that a ray meets before it ends, in their order, follow CRT_DIM_PASS +
-   CRT_PASSES_MAX · (2 · vertex), and of the vertex's shadow ray CRT_PASSES_MAX later. */
+/* The base of a camera path's vertex after `depth` scattering events. */
+CRT_FN u32 crt_vertex_dimension(u32 depth) { return CRT_DIM_VERTEX + CRT_DIM_PER_VERTEX * depth; }
+
+/* Each surface that a ray meets before it ends has one dimension. */
 #define CRT_DIM_PASS 0x80000000u
 #define CRT_PASSES_MAX 4096u /* the next surface stops a ray */
 /* On from there, where there are panes: whether one is passed, and which material of a mix is met. */
 #define CRT_DIM_PANE 0x20000000u
 #define CRT_DIM_PANE_MIX 0x40000000u
+
+/* The base of a camera path's ray to the vertex after `depth` scattering events, or of that vertex's shadow
+   ray. A macro: as a function it changes what NVCC inlines, and the full kernel spills 220 bytes. */
+#define CRT_PASSING_DIMENSION(depth, shadow) \
+    (CRT_DIM_PASS + CRT_PASSES_MAX * (2u * (depth) + ((shadow) ? 1u : 0u)))
 
 typedef struct CrtSampler {
     u32 kind;

@@ -62,11 +62,11 @@ typedef struct CrtWave {
     CRT_GLOBAL u64 *counts;
     CRT_GLOBAL u32 *primitives;
     CRT_GLOBAL u64 *rays;     /* pairs of counters */
-    u32 queue_of_kind[32];    /* by CRT_MATERIAL_… */
+    u32 queue_of_kind[CRT_MATERIAL_NUMBERS]; /* by CRT_MATERIAL_… */
     u32 queue_of_choice;      /* whose slots go on to other queues, or are traced on (crt_wave_choose) */
     u32 queue_of_miss;        /* CRT_NONE: nothing shines there */
 } CrtWave;
-CRT_ASSERT_SIZE(CrtWave, 264);
+CRT_ASSERT_SIZE(CrtWave, 392);
 
 /* Words of 4 bytes that slots and queues take besides the rows. */
 #define CRT_WAVE_WORDS(slots, queues) ((slots) * (3u + (queues)) + 2u * CRT_WAVE_QUEUES + 1u)
@@ -261,7 +261,8 @@ CRT_FN CrtPassage crt_load_passage(const CrtContext *ctx, const CrtWave *wave, u
     const vec4 carried = *crt_row(wave, shadow ? CRT_ROW_SHADOW_RADIANCE : CRT_ROW_THROUGHPUT, slot);
     const vec4 position =
         crt_has_panes(ctx) ? *crt_row(wave, CRT_ROW_WAVELENGTHS, slot) : splat4(0.0f);
-    CrtPassage way = crt_passage(depth, shadow, crt_row_vector(direction), position, media, carried);
+    CrtPassage way = crt_passage(CRT_PASSING_DIMENSION(depth, shadow), shadow, crt_row_vector(direction),
+                                 position, media, carried);
     if ((state & CRT_WAVE_PASSED) != 0u) {
         const vec4 passed = *crt_row(wave, CRT_ROW_PASSED, slot);
         way.passed = crt_bits(V4W(passed));

@@ -199,7 +199,7 @@ CRT_FN u32 crt_wave_choose(const CrtContext *ctx, const CrtWave *wave, u32 slot)
     }
     const CrtSurface surface = crt_surface(ctx, crt_load_hit(wave, slot));
     CrtSampler sampler = crt_load_sampler(ctx, wave, slot);
-    const u32 dimension = CRT_DIM_VERTEX + CRT_DIM_PER_VERTEX * crt_load_depth(wave, slot);
+    const u32 dimension = crt_vertex_dimension(crt_load_depth(wave, slot));
     const u32 material = crt_chosen_material(ctx, &surface, crt_load_path_ray(wave, slot).d, &sampler,
                                              dimension + CRT_DIM_MIX);
     return crt_queue_of_material(ctx, wave, material);

@@ -10,13 +10,12 @@ CRT_KERNEL_BEGIN
 
 /* Scatters the path: its ray, throughput and densities become those of the way to its next vertex. Returns 0
    where it is absorbed. */
-CRT_FN int crt_continue(const CrtContext *ctx, CrtPath *path, const CrtSurface *surface, const CrtBsdf *bsdf,
-                        u32 dimension) {
+CRT_FN int crt_continue(const CrtContext *ctx, CrtPath *path, const CrtVertex *vertex, u32 dimension) {
+    const CrtSurface *surface = &vertex->surface;
     const CrtRandom2 u = crt_sample_2d(&path->sampler, dimension + CRT_DIM_BSDF);
     CrtRandom2 choice = u;
-    if ((CRT_HAS(ROUGH_DIELECTRIC) || CRT_HAS(PLASTIC)) && (bsdf->flags & CRT_BSDF_CHOOSES) != 0u)
-        choice = crt_sample_2d(&path->sampler, dimension + CRT_DIM_CHOICE);
-    const CrtScatter scatter = crt_surface_sample(bsdf, u, choice, path->hero, path->alone);
+    if (crt_vertex_chooses(vertex)) choice = crt_sample_2d(&path->sampler, dimension + CRT_DIM_CHOICE);
+    const CrtScatter scatter = crt_vertex_sample(vertex, u, choice, path->hero, path->alone, CRT_RADIANCE);
     if (!scatter.valid) return 0;
 
     path->throughput = path->throughput * scatter.weight;
@@ -26,10 +25,10 @@ CRT_FN int crt_continue(const CrtContext *ctx, CrtPath *path, const CrtSurface *
     }
     path->eta_square = path->eta_square * scatter.eta_square;
     path->scatter_pdf = scatter.pdf;
-    path->scatter_cosine = crt_scatter_cosine(bsdf, scatter.wi);
+    path->scatter_cosine = crt_scatter_cosine(&vertex->bsdf, scatter.wi);
     path->p = surface->p;
-    if (CRT_HAS(LIGHT_TREE)) path->side = crt_scattering_side(bsdf);
-    if (CRT_HAS(MEDIA)) path->media = crt_media_behind(ctx, surface, bsdf, scatter.wi, path->media);
+    if (CRT_HAS(LIGHT_TREE)) path->side = crt_scattering_side(vertex);
+    if (CRT_HAS(MEDIA)) path->media = crt_vertex_media(ctx, vertex, scatter.wi, path->media);
     path->ray.o = crt_offset_origin(surface->p, surface->clearance, surface->ng, scatter.wi);
     path->ray.d = scatter.wi;
     path->ray.reach = CRT_INFINITY;

@@ -9,9 +9,8 @@
 #include "kernel/lights/light_tree.h"
 #include "kernel/lights/point_light.h"
 #include "kernel/lights/shape_light.h"
-#include "kernel/materials/medium.h"
-#include "kernel/materials/normal_map.h"
 #include "kernel/transport/path_state.h"
+#include "kernel/transport/vertex.h"
 
 CRT_KERNEL_BEGIN
 
@@ -25,18 +24,18 @@ typedef struct CrtShadow {
 } CrtShadow;
 
 /* Absorbs the light of a pending shadow ray on its way of `distance` along wi. */
-CRT_FN void crt_absorb_shadow(const CrtContext *ctx, const CrtPath *path, const CrtSurface *surface,
-                              const CrtBsdf *bsdf, vec3 wi, f32 distance, CrtShadow *shadow) {
-    shadow->media = crt_media_behind(ctx, surface, bsdf, wi, path->media);
+CRT_FN void crt_absorb_shadow(const CrtContext *ctx, const CrtPath *path, const CrtVertex *vertex,
+                              vec3 wi, f32 distance, CrtShadow *shadow) {
+    shadow->media = crt_vertex_media(ctx, vertex, wi, path->media);
     shadow->radiance = shadow->radiance * crt_transmittance(ctx, crt_first_medium(ctx, shadow->media),
                                                             distance, path->wavelengths.position);
 }
 
-/* A direct-lighting sample of a point: the direction to a light, and the light that arrives if nothing is in
-   the way. */
+/* A direct-lighting sample of a vertex: the direction to a light, and the light that arrives if nothing is
+   in the way. */
 typedef struct CrtDirectSample {
     u32 light;       /* row of the light table */
-    vec3 wi;         /* unit, from the point */
+    vec3 wi;         /* unit, from the vertex */
     f32 distance;    /* along wi; infinite from outside the scene */
     f32 irradiance;  /* that a plane facing wi gets per unit of the light's spectrum; 0: no light */
     f32 pdf;         /* per steradian, with the probability of choosing the light; 0: a single direction */
@@ -50,24 +49,26 @@ typedef struct CrtDirectSample {
 } CrtDirectSample;
 
 CRT_FN CrtDirectSample crt_direct_sample_of(const CrtContext *ctx, u32 light, CrtSampler *sampler,
-                                            u32 dimension, vec3 p, const CrtBsdf *bsdf) {
+                                            u32 dimension, const CrtVertex *vertex) {
+    const vec3 p = vertex->surface.p;
     CrtDirectSample direct;
     direct.light = light;
     direct.distance = CRT_INFINITY;
     direct.point = p;
-    direct.normal = bsdf->ns;
+    direct.normal = vertex->bsdf.ns;
     direct.reach = direct.cosine = 0.0f;
     direct.area = 0;
     direct.place = crt_no_place();
     direct.environment = CRT_HAS(ENVIRONMENT_LIGHT) && direct.light + 1u == ctx->scene->environment_light;
     if (direct.environment) {
-        const CrtEnvironmentSample s = crt_environment_sample(ctx, sampler, dimension, crt_base(bsdf));
+        const CrtEnvironmentSample s =
+            crt_environment_sample(ctx, sampler, dimension, crt_vertex_base(vertex));
         direct.wi = s.wi;
         direct.pdf = s.pdf;
         direct.place = s.place;
         /* Of one without an image, what would be transmitted is left to scattered rays. */
         const int sampled =
-            s.pdf > 0.0f && (crt_has_environment_image(ctx) || dot3(s.wi, crt_side(bsdf)) > 0.0f);
+            s.pdf > 0.0f && (crt_has_environment_image(ctx) || dot3(s.wi, crt_vertex_side(vertex)) > 0.0f);
         direct.irradiance = sampled ? 1.0f / s.pdf : 0.0f;
         return direct;
     }
@@ -98,23 +99,19 @@ CRT_FN CrtDirectSample crt_direct_sample_of(const CrtContext *ctx, u32 light, Cr
     return direct;
 }
 
-/* The normal of a surface that scatters nothing to its other side; otherwise of length 0. */
-CRT_FN vec3 crt_scattering_side(const CrtBsdf *bsdf) {
-    return (bsdf->flags & CRT_BSDF_TRANSMITS) == 0u ? crt_side(bsdf) : make_vec3(0.0f, 0.0f, 0.0f);
-}
-
-CRT_FN CrtDirectSample crt_direct_sample(const CrtContext *ctx, CrtSampler *sampler, u32 dimension, vec3 p,
-                                         const CrtBsdf *bsdf) {
+CRT_FN CrtDirectSample crt_direct_sample(const CrtContext *ctx, CrtSampler *sampler, u32 dimension,
+                                         const CrtVertex *vertex) {
     u32 light, none = 0u;
     f32 probability = 1.0f;
     if (crt_has_light_tree(ctx)) {
-        light = crt_light_tree_choose(ctx, sampler, dimension, p, crt_scattering_side(bsdf), &probability);
+        light = crt_light_tree_choose(ctx, sampler, dimension, vertex->surface.p,
+                                      crt_scattering_side(vertex), &probability);
         none = light == CRT_NONE;
         if (none) light = 0u;
     } else {
         light = crt_light_choose(ctx, sampler, dimension);
     }
-    CrtDirectSample direct = crt_direct_sample_of(ctx, light, sampler, dimension, p, bsdf);
+    CrtDirectSample direct = crt_direct_sample_of(ctx, light, sampler, dimension, vertex);
     if (crt_has_light_tree(ctx)) {
         direct.irradiance = none ? 0.0f : direct.irradiance / probability;
         direct.pdf = direct.pdf * probability;
@@ -122,35 +119,34 @@ CRT_FN CrtDirectSample crt_direct_sample(const CrtContext *ctx, CrtSampler *samp
     return direct;
 }
 
-/* Probability with which the BSDF finds a direct-lighting sample, over that of light sampling. An emitter's
-   are per area (crt_add_emission): of a ray scattered at the shadow ray's origin pdf·|n·d|/|d|³, of light
-   sampling pdf·cos/distance². */
-CRT_FN f32 crt_direct_ratio(const CrtDirectSample *direct, const CrtBsdf *bsdf, CrtRay ray) {
+/* Probability with which scattering finds a direct-lighting sample, over that of light sampling. Those of
+   an emitter are per area (crt_add_emission): of a ray scattered at the shadow ray's origin
+   pdf·|n·d|/|d|³, of light sampling pdf·cos/distance². */
+CRT_FN f32 crt_direct_ratio(const CrtDirectSample *direct, const CrtVertex *vertex, CrtRay ray) {
     const f32 squared = dot3(ray.d, ray.d);
     const vec3 towards = direct->area ? ray.d * (1.0f / crt_sqrt(squared)) : direct->wi;
-    const f32 pdf = crt_surface_pdf(bsdf, towards);
+    const f32 pdf = crt_vertex_pdf(vertex, towards);
     if (!direct->area) return pdf / direct->pdf;
     return pdf * crt_abs(dot3(direct->normal, towards)) * direct->distance * direct->distance /
            (direct->pdf * direct->cosine * squared);
 }
 
 /* Next event estimation: a light, and a ray towards it. */
-CRT_FN void crt_sample_lights(const CrtContext *ctx, CrtPath *path, const CrtSurface *surface,
-                              const CrtBsdf *bsdf, u32 dimension, CrtShadow *shadow) {
-    const CrtDirectSample direct = crt_direct_sample(ctx, &path->sampler, dimension, surface->p, bsdf);
-    if (!(direct.irradiance > 0.0f)) return;
-    const int before = dot3(direct.wi, crt_side(bsdf)) > 0.0f;
-    if ((bsdf->flags & (before ? CRT_BSDF_REFLECTS : CRT_BSDF_TRANSMITS)) == 0u) return;
-    const vec4 scattered = crt_surface_eval(bsdf, direct.wi);
+CRT_FN void crt_sample_lights(const CrtContext *ctx, CrtPath *path, const CrtVertex *vertex,
+                              u32 dimension, CrtShadow *shadow) {
+    const CrtSurface *surface = &vertex->surface;
+    const CrtDirectSample direct = crt_direct_sample(ctx, &path->sampler, dimension, vertex);
+    if (!(direct.irradiance > 0.0f) || !crt_vertex_scatters(vertex, direct.wi)) return;
+    const vec4 scattered = crt_vertex_eval(vertex, direct.wi, CRT_RADIANCE);
     if (max4(scattered) == 0.0f) return;
     const int far = direct.distance == CRT_INFINITY;
     shadow->pending = 1;
-    shadow->ray.o = crt_offset_origin(surface->p, surface->clearance, crt_side(bsdf), direct.wi);
+    shadow->ray.o = crt_offset_origin(surface->p, surface->clearance, crt_vertex_side(vertex), direct.wi);
     shadow->ray.d = far ? direct.wi : direct.point - shadow->ray.o;
     shadow->ray.reach = far ? CRT_INFINITY : direct.reach;
     f32 weight = direct.irradiance;
     if (direct.pdf > 0.0f && ctx->scene->nee == CRT_NEE_MIS)
-        weight = weight * crt_power_heuristic(crt_direct_ratio(&direct, bsdf, shadow->ray));
+        weight = weight * crt_power_heuristic(crt_direct_ratio(&direct, vertex, shadow->ray));
     const vec4 position = path->wavelengths.position;
     const vec4 light =
         direct.environment
@@ -158,7 +154,7 @@ CRT_FN void crt_sample_lights(const CrtContext *ctx, CrtPath *path, const CrtSur
             : crt_value(ctx, CRT_ARRAY(CrtLight, ctx->blob, ctx->scene->lights)[direct.light].radiance, 0,
                         position);
     shadow->radiance = path->throughput * scattered * light * weight;
-    if (CRT_HAS(MEDIA)) crt_absorb_shadow(ctx, path, surface, bsdf, direct.wi, direct.distance, shadow);
+    if (CRT_HAS(MEDIA)) crt_absorb_shadow(ctx, path, vertex, direct.wi, direct.distance, shadow);
 }
 
 CRT_KERNEL_END

@@ -35,10 +35,11 @@ typedef struct CrtPassage {
     vec4 carried;  /* the throughput of the path, or the light that a shadow ray tests */
 } CrtPassage;
 
-/* The state at the start of a path's ray, or of the shadow ray of its vertex. */
-CRT_FN CrtPassage crt_passage(u32 depth, int shadow, vec3 d, vec4 position, u32 media, vec4 carried) {
+/* The state at the start of a path's ray, or of the shadow ray of its vertex. `dimension`: of the first
+   surface (CRT_PASSING_DIMENSION). */
+CRT_FN CrtPassage crt_passage(u32 dimension, int shadow, vec3 d, vec4 position, u32 media, vec4 carried) {
     CrtPassage way;
-    way.dimension = CRT_DIM_PASS + CRT_PASSES_MAX * (2u * depth + (shadow ? 1u : 0u));
+    way.dimension = dimension;
     way.passed = 0u;
     way.shadow = shadow;
     way.media = media;

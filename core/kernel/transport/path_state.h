@@ -33,7 +33,7 @@ CRT_KERNEL_BEGIN
  *   eta_square      product of squared relative indices crossed: roulette must not see the n² of being
  *                   inside glass
  *   media           around the ray where it begins (medium.h)
- *   side            the normal at p (crt_scattering_side)
+ *   side            crt_scattering_side (vertex.h) of the vertex at p
  */
 #define CRT_PATH_STATE(VERTEX, TREE, BEGIN, FIRST)                                              \
     VERTEX(ORIGIN, CrtRay ray; u32 depth; vec4 hero; int alone;, V3(ray.o, WORD))               \

@@ -63,42 +63,39 @@ CRT_FN int crt_shade(const CrtContext *ctx, CrtPath *path, CrtHit hit, CrtShadow
         crt_add_distant_emission(ctx, path);
         return 0;
     }
-    const u32 dimension = CRT_DIM_VERTEX + CRT_DIM_PER_VERTEX * path->depth;
-    CrtSurface surface = crt_surface(ctx, hit);
+    const u32 dimension = crt_vertex_dimension(path->depth);
+    CrtVertex vertex;
+    CrtSurface *surface = &vertex.surface;
+    vertex.surface = crt_surface(ctx, hit);
+    vertex.wo = -path->ray.d;
     if (CRT_HAS(MEDIA)) {
-        surface.medium = crt_medium_of(ctx, surface.material);
-        surface.touches = crt_touches(ctx, hit);
+        surface->medium = crt_medium_of(ctx, surface->material);
+        surface->touches = crt_touches(ctx, hit);
     }
     if (CRT_HAS(MIX))
-        surface.material =
+        surface->material =
             path->met != CRT_NONE
                 ? path->met
-                : crt_chosen_material(ctx, &surface, path->ray.d, &path->sampler, dimension + CRT_DIM_MIX);
-    if (CRT_HAS(MEDIA)) crt_absorb(ctx, path, &surface);
-    if (CRT_HAS(AREA_LIGHT) && surface.light != CRT_NONE) crt_add_emission(ctx, path, &surface, hit.t);
+                : crt_chosen_material(ctx, surface, path->ray.d, &path->sampler, dimension + CRT_DIM_MIX);
+    if (CRT_HAS(MEDIA)) crt_absorb(ctx, path, surface);
+    if (CRT_HAS(AREA_LIGHT) && surface->light != CRT_NONE) crt_add_emission(ctx, path, surface, hit.t);
 
     const int first = CRT_HAS(AOV) && scene->aovs != 0u && path->depth == 0u;
     if (!first && path->depth >= scene->max_depth) return 0;
-    CrtBsdf bsdf;
-    vec3 wo = -path->ray.d;
-    const vec3 ng = surface.ng;
-    if (CRT_HAS(THIN_DIELECTRIC)) bsdf.pane_cosine = crt_pane_cosine(&surface, path->ray.d);
-    if (CRT_HAS(NORMAL_MAP)) crt_map_normal(ctx, &surface, hit.slot, &wo, &bsdf);
-    if (crt_sees_face(ctx, surface.material, path->depth)) surface.ns = ng;
-    crt_layered_prepare(ctx, &bsdf, &surface, wo, path->wavelengths.position, path->throughput, first);
-    surface.ng = ng;
+    crt_vertex_prepare(ctx, &vertex, hit.slot, path->wavelengths.position, path->throughput,
+                       crt_sees_face(ctx, surface->material, path->depth), first);
     if (first) {
-        path->first.normal = bsdf.ns;
+        path->first.normal = vertex.bsdf.ns;
         path->first.depth = hit.t * scene->depth_scale;
         path->first.primitive = hit.id;
-        path->first.albedo = bsdf.albedo;
+        path->first.albedo = vertex.bsdf.albedo;
         if (path->depth >= scene->max_depth) return 0;
     }
 
     if (CRT_HAS(NEE) && scene->nee != CRT_NEE_NONE && scene->lights.count != 0u &&
-        !crt_is_delta(&bsdf))
-        crt_sample_lights(ctx, path, &surface, &bsdf, dimension, shadow);
-    return crt_continue(ctx, path, &surface, &bsdf, dimension) && crt_roulette(ctx, path, dimension);
+        !crt_vertex_is_delta(&vertex))
+        crt_sample_lights(ctx, path, &vertex, dimension, shadow);
+    return crt_continue(ctx, path, &vertex, dimension) && crt_roulette(ctx, path, dimension);
 }
 
 CRT_KERNEL_END

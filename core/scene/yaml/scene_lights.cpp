@@ -163,15 +163,9 @@ void readBrightness(const SectionReader& section, SpectrumReader& spectra, Point
 
 /// True if the light is specified by an amount that spreads over square metres, such as lumens.
 bool spreadsOverArea(const SectionReader& section, const PointLight& light) {
-    switch (light.type) {
-        case PointLightType::Point:
-        case PointLightType::Spot:
-        case PointLightType::Ies: return true;
-        case PointLightType::Beam: return section.has("power_w") || section.has("luminous_flux_lm");
-        case PointLightType::Directional:
-        case PointLightType::Sun: break;
-    }
-    return false;
+    const bool is_beam = light.type == PointLightType::Beam;
+    return shinesFromPoint(light.type) ||
+           (is_beam && (section.has("power_w") || section.has("luminous_flux_lm")));
 }
 
 /// Distances stay in the scene's units: what a square metre gets is given to the square of as many units.

@@ -40,13 +40,11 @@ void MaterialReader::readMaterial(const YamlEntry& entry) {
             take("reflectance", SpectrumUse::Reflectance, material.reflectance);
     };
     const auto takeNumber = [&](std::string_view key, double& number, TextureIndex& texture) {
-        if (TextureReader::isTexture(*section, key))
+        const bool textured = section->schema().find(key)->section == "texture";
+        if (textured && TextureReader::isTexture(*section, key))
             texture = textures_.read(*section, key, TexelKind::Numbers).value_or(kNoTexture);
         else
             section->read(key, number);
-    };
-    const auto takeRoughness = [&] {
-        takeNumber("roughness", material.roughness, material.roughness_texture);
     };
     const std::string kind = variantWord(section->schema());
     for (const auto& [type, word] : kMaterialNames)
@@ -70,14 +68,16 @@ void MaterialReader::readMaterial(const YamlEntry& entry) {
         add();
         return;
     }
+    const bool is_diffuse = material.type == MaterialType::Diffuse;
+    if (is_diffuse) section->read("roughness", material.diffuse_roughness);
+    else if (section->schema().find("roughness") != nullptr)
+        takeNumber("roughness", material.roughness, material.roughness_texture);
+    if (section->schema().find("reflectance") != nullptr) takeReflectance();
+    for (const auto& [key, member] : kMaterialNumbers)
+        if (section->schema().find(key) != nullptr) section->read(key, material.*member);
     switch (material.type) {
-        case MaterialType::Diffuse:
-            section->read("roughness", material.diffuse_roughness);
-            takeReflectance();
-            makeRoughDiffuse(material);
-            break;
-        case MaterialType::Mirror: takeReflectance(); break;
-        case MaterialType::RoughConductor: takeRoughness(); [[fallthrough]];
+        case MaterialType::Diffuse: makeRoughDiffuse(material); break;
+        case MaterialType::RoughConductor:
         case MaterialType::Conductor: {
             std::string metal;
             if (section->readWord("metal", metal))
@@ -86,7 +86,7 @@ void MaterialReader::readMaterial(const YamlEntry& entry) {
             take("k", SpectrumUse::Index, material.k);
             break;
         }
-        case MaterialType::RoughDielectric: takeRoughness(); [[fallthrough]];
+        case MaterialType::RoughDielectric:
         case MaterialType::Dielectric:
             material.absorption = spectra_.read(*section, "absorption", SpectrumUse::Absorption);
             [[fallthrough]];
@@ -98,11 +98,10 @@ void MaterialReader::readMaterial(const YamlEntry& entry) {
         case MaterialType::Plastic: {
             double ior = 1.5;
             section->read("ior", ior);
-            section->read("roughness", material.roughness);
             material.eta = constantSpectrum(ior);
-            takeReflectance();
             break;
         }
+        default: break;  // the keys above are all that it has
     }
     if (material.absorption && !material.isOpaque())
         section->error("opacity",
@@ -143,8 +142,6 @@ void MaterialReader::readThinFilm(const SectionReader& section, Material& materi
 }
 
 void MaterialReader::readAnisotropy(const SectionReader& section, Material& material) const {
-    section.read("roughness_anisotropy", material.anisotropy);
-    section.read("anisotropy_rotation_deg", material.anisotropy_rotation_deg);
     if (!(material.anisotropy > 0)) return;
     if (material.roughness_texture != kNoTexture)
         section.error("roughness_anisotropy",

@@ -1,0 +1,442 @@
+/// All kinds of materials, and a surface of each at which tests scatter light. A new material is a line in
+/// subjects().
+#pragma once
+
+#include "kernel_test.h"
+#include "verify/references.h"
+
+#include <algorithm>
+#include <array>
+#include <complex>
+#include <functional>
+#include <vector>
+
+namespace bsdf_test {
+
+using namespace kernel_test;
+using crt::Material;
+using crt::MaterialType;
+using crt::Vec3d;
+
+constexpr double kPi = 3.14159265358979323846;
+
+inline double lane(vec4 v, u32 i) { return i == 0 ? V4X(v) : i == 1 ? V4Y(v) : i == 2 ? V4Z(v) : V4W(v); }
+
+/// Unpolarised Fresnel reflectance for a complex index, from the field amplitudes.
+inline double fresnel(double cosine, std::complex<double> index) {
+    const double s2 = 1 - cosine * cosine;
+    const std::complex<double> root = std::sqrt(index * index - s2);
+    const auto rs = (cosine - root) / (cosine + root),
+               rp = (index * index * cosine - root) / (index * index * cosine + root);
+    return (std::norm(rs) + std::norm(rp)) / 2;
+}
+
+inline Material make(MaterialType type, const std::function<void(Material&)>& fill) {
+    Material m;
+    m.type = type;
+    m.reflectance = m.eta = m.k = crt::constantSpectrum(0);
+    fill(m);
+    return m;
+}
+
+inline Material reflecting(MaterialType type, double reflectance) {
+    return make(type, [&](Material& m) { m.reflectance = crt::constantSpectrum(reflectance); });
+}
+inline Material metal(MaterialType type, double eta, double k) {
+    return make(type, [&](Material& m) {
+        m.eta = crt::constantSpectrum(eta);
+        m.k = crt::constantSpectrum(k);
+    });
+}
+inline Material roughMetal(double eta, double k, double roughness) {
+    Material m = metal(MaterialType::RoughConductor, eta, k);
+    m.roughness = roughness;
+    return m;
+}
+inline Material glass(double first, double last, MaterialType type = MaterialType::Dielectric) {
+    return make(type, [&](Material& m) {
+        m.eta = crt::constantSpectrum(first);
+        for (std::size_t i = 0; i < m.eta.values.size(); ++i)
+            m.eta[i] = first + (last - first) * static_cast<double>(i) / 470;
+    });
+}
+
+inline Material roughGlass(double first, double last, double roughness) {
+    Material m = glass(first, last, MaterialType::RoughDielectric);
+    m.roughness = roughness;
+    return m;
+}
+
+inline Material colored(double f0, double tint, double weight, double roughness) {
+    Material m = reflecting(MaterialType::RoughConductor, f0);
+    m.by_color = true;
+    m.edge_tint = crt::constantSpectrum(tint);
+    m.weight = weight;
+    m.roughness = roughness;
+    return m;
+}
+
+inline Material brushed(Material m, double anisotropy, double rotation_deg = 0) {
+    m.anisotropy = anisotropy;
+    m.anisotropy_rotation_deg = rotation_deg;
+    return m;
+}
+
+inline Material plastic(double reflectance, double roughness, double ior = 1.5) {
+    Material m = reflecting(MaterialType::Plastic, reflectance);
+    m.eta = crt::constantSpectrum(ior);
+    m.roughness = roughness;
+    return m;
+}
+
+inline Material glossy(double color, double roughness) {
+    Material m = plastic(color, roughness);
+    m.by_color = true;
+    return m;
+}
+
+inline Material clay(Material m, double roughness) {
+    m.diffuse_roughness = roughness;
+    return m;
+}
+
+inline Material fuzzy(Material m, double weight, double color, double roughness) {
+    m.fuzz = weight;
+    m.fuzz_color = crt::constantSpectrum(color);
+    m.fuzz_roughness = roughness;
+    return m;
+}
+
+inline Material lacquered(Material m, const crt::verify::Lacquer& lacquer) {
+    crt::Clearcoat& coat = m.clearcoat.emplace();
+    coat.ior = lacquer.ior;
+    coat.roughness = lacquer.roughness;
+    coat.depth = crt::constantSpectrum(-std::log(lacquer.color) / 2);
+    coat.darkening = lacquer.darkening;
+    coat.base_roughness = lacquer.base_roughness;
+    return m;
+}
+
+inline Material filmed(Material m, double thickness_nm, double index) {
+    m.film_thickness_nm = thickness_nm;
+    m.film_index = crt::constantSpectrum(index);
+    return m;
+}
+
+/// As prepared by Bench, λ − 360 nm: whole nanometres, where tables have their nodes.
+constexpr std::array<std::size_t, 4> kPositions{20, 120, 230, 400};
+
+/// (Index behind the surface over that before it)², at a wavelength of the bench: what lies between
+/// radiance and what refraction keeps.
+inline double indexSquare(const Material& m, u32 lane) {
+    if (m.type != MaterialType::Dielectric && m.type != MaterialType::RoughDielectric) return 1;
+    return m.eta[kPositions[lane]] * m.eta[kPositions[lane]];
+}
+
+struct Subject {
+    const char* name;
+    Material material;
+    /// The share of light from everywhere that is scattered, by the cosine of w_o, which is below 0 inside.
+    std::function<double(double)> albedo;
+    /// The share of it that goes into single directions, beside a lobe.
+    std::function<double(double)> single = [](double) { return 0.0; };
+    bool reciprocal = true;
+    /// True if the remaining light depends on its direction.
+    bool tinted = false;
+    u32 numbers = 512;  ///< The square of this number makes its means: more where weights differ much.
+};
+
+/// All that the tests ask of, one line each.
+inline std::vector<Subject> subjects() {
+    const auto constant = [](double a) { return [a](double) { return a; }; };
+    const auto of_metal = [](double n, double k) {
+        return [n, k](double cosine) { return fresnel(std::abs(cosine), {n, k}); };
+    };
+    const auto rough = [](double n, double k, double roughness) {
+        return [=](double cosine) {
+            return crt::verify::roughConductorAlbedo(std::abs(cosine), n, k, roughness);
+        };
+    };
+    const auto coated = [](double base, double roughness) {
+        return [=](double cosine) {
+            return crt::verify::plasticAlbedo(std::abs(cosine), base, 1.5, roughness);
+        };
+    };
+    const auto of_film = [](double n, double k, double thickness_nm, double index) {
+        return [=](double cosine) {
+            return crt::verify::filmReflectance(std::abs(cosine), index, thickness_nm, 360 + 230, {n, k});
+        };
+    };
+    const auto coat = [](double cosine) { return fresnel(std::abs(cosine), 1.5); };
+    const auto none = [](double) { return 0.0; };
+    const auto passed = [](double cosine, double weight, double roughness) {
+        return 1 - weight * crt::verify::sheenAlbedo(std::abs(cosine), roughness);
+    };
+    const auto mirrored = [=](double cosine) { return 0.9 * passed(cosine, 0.5, 1); };
+    const auto on_mirror = [=](double cosine) {
+        return mirrored(cosine) + 0.7 * (1 - passed(cosine, 0.5, 1));
+    };
+    const auto under_fuzz = [=](double cosine) { return coat(cosine) * passed(cosine, 1, 0.7); };
+    const auto of_gloss = [](double color, double roughness) {
+        return [=](double cosine) {
+            const double gloss =
+                crt::verify::microfacetShares(std::abs(cosine), 1.5, roughness).reflected;
+            return gloss + (1 - gloss) * color;
+        };
+    };
+    using crt::verify::Lacquer;
+    const auto lacquer_on = [](const Lacquer& lacquer, double base) {
+        return [=](double cosine) { return lacquer.albedo(std::abs(cosine), base); };
+    };
+    const auto gloss_of = [](const Lacquer& lacquer) {
+        return [=](double cosine) { return lacquer.mirrored(std::abs(cosine)); };
+    };
+    // Of a mirror the light has the same cosine both ways.
+    const auto under = [](const Lacquer& lacquer, double base) {
+        return [=](double cosine) {
+            const double c = std::abs(cosine), passed = lacquer.passed(c);
+            return (1 - lacquer.mirrored(c)) * lacquer.darkened(c, base) * base * passed * passed;
+        };
+    };
+    const auto sum = [](auto a, auto b) { return [=](double cosine) { return a(cosine) + b(cosine); }; };
+    const Lacquer clear{}, satin{.ior = 1.5, .roughness = 0.5};
+    const Lacquer amber{.ior = 1.4, .roughness = 0.4, .color = 0.5, .darkening = 0.7};
+    const Lacquer varnish{.color = 0.6, .darkening = 0.5, .base_roughness = 0};
+    const Lacquer frosted{.ior = 1.7, .roughness = 0.6, .color = 0.7, .base_roughness = 0.3};
+    const auto on_white_fuzz = [=](double cosine) {
+        return clear.mirrored(std::abs(cosine)) * passed(cosine, 0.5, 0.6);
+    };
+    // The views are at azimuth 0.7, and the bench's tangent is x.
+    const auto of_brushed = [](double n, double k, double roughness, double anisotropy, double turn_deg) {
+        return [=](double cosine) {
+            const double sine = std::sqrt(1 - cosine * cosine), phi = 0.7 - turn_deg * kPi / 180;
+            return crt::verify::brushedAlbedo({sine * std::cos(phi), sine * std::sin(phi), std::abs(cosine)},
+                                              n, k, roughness, anisotropy);
+        };
+    };
+    return {
+        {"diffuse", reflecting(MaterialType::Diffuse, 0.7), constant(0.7)},
+        {"white diffuse", reflecting(MaterialType::Diffuse, 1), constant(1)},
+        {"mirror", reflecting(MaterialType::Mirror, 0.9), constant(0.9)},
+        {"conductor", metal(MaterialType::Conductor, 0.2, 3), of_metal(0.2, 3)},
+        {"rough conductor of roughness 0", roughMetal(0.2, 3, 0), of_metal(0.2, 3)},
+        // Narrower lobes fall between the directions of overCells; `crt verify` has them (G12).
+        {"rough conductor of roughness 0.2", roughMetal(0.2, 3, 0.2), rough(0.2, 3, 0.2)},
+        {"rough conductor of roughness 0.5", roughMetal(0.2, 3, 0.5), rough(0.2, 3, 0.5)},
+        {"rough conductor of roughness 1", roughMetal(0.2, 3, 1), rough(0.2, 3, 1)},
+        {"rough perfect metal", roughMetal(1, 1e6, 1), constant(1)},
+        {"brushed metal", brushed(roughMetal(0.2, 3, 0.6), 0.7), of_brushed(0.2, 3, 0.6, 0.7, 0)},
+        {"brushed metal, turned", brushed(roughMetal(0.2, 3, 1), 0.8, 65), of_brushed(0.2, 3, 1, 0.8, 65)},
+        {"brushed perfect metal", brushed(roughMetal(1, 1e6, 1), 0.9), constant(1)},
+        {"brushed glass", brushed(roughGlass(1.5, 1.5, 0.8), 0.6, 25), constant(1)},
+        {"brushed dispersive glass", brushed(roughGlass(1.7, 1.6, 0.7), 0.5), constant(1)},
+        {"a film on brushed perfect metal", filmed(brushed(roughMetal(1, 1e6, 0.6), 0.8), 500, 1.5),
+         constant(1)},
+        {"polished metal by its colours", colored(0.6, 0.3, 0.8, 0),
+         [](double cosine) { return 0.8 * crt::verify::f82Tint(std::abs(cosine), 0.6, 0.3); }},
+        {"rough metal by its colours", colored(0.6, 0.3, 0.8, 0.7),
+         [](double cosine) { return crt::verify::tintedMetalAlbedo(std::abs(cosine), 0.6, 0.3, 0.8, 0.7); }},
+        {"white brushed metal by its colours", brushed(colored(1, 1, 1, 0.8), 0.7), constant(1)},
+        {"glossy", glossy(0.6, 0.5), of_gloss(0.6, 0.5)},
+        {"clay", clay(plastic(0.7, 0, 1), 0.6),
+         [](double cosine) { return crt::verify::eonAlbedo(std::abs(cosine), 0.7, 0.6); }, none, true, false,
+         2048},
+        {"white clay", clay(plastic(1, 0, 1), 1), constant(1), none, true, false, 2048},
+        {"nearly smooth white clay", clay(plastic(1, 0, 1), 2e-6), constant(1)},
+        {"glazed clay", clay(glossy(0.6, 0), 0.8),
+         [](double cosine) { return crt::verify::glossyEonAlbedo(std::abs(cosine), 0.6, 0.8, 1.5); }, coat},
+        {"white clay under satin", clay(glossy(1, 0.5), 1), constant(1), none, true, false, 2048},
+        {"white fuzz on white", fuzzy(reflecting(MaterialType::Diffuse, 1), 1, 1, 0.5), constant(1), none,
+         false},
+        {"dust on a mirror", fuzzy(reflecting(MaterialType::Mirror, 0.9), 0.5, 0.7, 1), on_mirror, mirrored,
+         false},
+        {"fuzz on rough metal", fuzzy(roughMetal(1, 1e6, 0.6), 1, 1, 0.4), constant(1), none, false},
+        {"fuzz on plastic", fuzzy(plastic(1, 0), 1, 1, 0.7), constant(1), under_fuzz, false},
+        {"fuzz on rough glass", fuzzy(roughGlass(1.5, 1.5, 0.5), 1, 1, 0.6), constant(1), none, false},
+        {"lacquer on white", lacquered(reflecting(MaterialType::Diffuse, 1), clear), constant(1),
+         gloss_of(clear), false},
+        {"satin lacquer on white", lacquered(reflecting(MaterialType::Diffuse, 1), satin), constant(1), none,
+         false},
+        {"lacquer on grey", lacquered(reflecting(MaterialType::Diffuse, 0.5), clear), lacquer_on(clear, 0.5),
+         gloss_of(clear), false},
+        {"amber lacquer on grey", lacquered(reflecting(MaterialType::Diffuse, 0.6), amber),
+         lacquer_on(amber, 0.6), none, false, true},
+        {"varnish on a mirror", lacquered(reflecting(MaterialType::Mirror, 0.9), varnish),
+         sum(gloss_of(varnish), under(varnish, 0.9)), sum(gloss_of(varnish), under(varnish, 0.9)), false,
+         true},
+        {"frosted lacquer on a mirror", lacquered(reflecting(MaterialType::Mirror, 0.9), frosted),
+         sum(gloss_of(frosted), under(frosted, 0.9)), under(frosted, 0.9), false, true},
+        {"lacquer on rough metal", lacquered(roughMetal(1, 1e6, 0.6), clear), constant(1), gloss_of(clear),
+         false},
+        {"satin lacquer on white brushed metal by its colours",
+         lacquered(brushed(colored(1, 1, 1, 0.8), 0.7), satin), constant(1), none, false},
+        {"satin lacquer on plastic", lacquered(glossy(1, 0), satin), constant(1),
+         [=](double cosine) { return (1 - satin.mirrored(std::abs(cosine))) * coat(cosine); }, false},
+        {"satin lacquer on clay", lacquered(clay(plastic(1, 0, 1), 1), satin), constant(1), none, false,
+         false, 2048},
+        {"white fuzz on lacquer on white",
+         fuzzy(lacquered(reflecting(MaterialType::Diffuse, 1), clear), 0.5, 1, 0.6), constant(1),
+         on_white_fuzz, false},
+        {"white fuzz on satin lacquer on rough metal",
+         fuzzy(lacquered(roughMetal(1, 1e6, 0.6), satin), 1, 1, 0.5), constant(1), none, false},
+        {"glass", glass(1.5, 1.5), constant(1)},
+        {"dispersive glass", glass(1.7, 1.6), constant(1)},
+        {"rough glass of roughness 0", roughGlass(1.5, 1.5, 0), constant(1)},
+        {"rough glass of index 1", roughGlass(1, 1, 0.5), constant(1)},
+        {"rough glass of roughness 0.5", roughGlass(1.5, 1.5, 0.5), constant(1)},
+        {"rough glass of roughness 1", roughGlass(2.4, 2.4, 1), constant(1)},
+        {"a rough bubble in glass", roughGlass(1 / 1.5, 1 / 1.5, 0.6), constant(1)},
+        {"dispersive rough glass", roughGlass(1.7, 1.6, 0.5), constant(1)},
+        {"oxide on metal", filmed(metal(MaterialType::Conductor, 0.2, 3), 300, 2), of_film(0.2, 3, 300, 2)},
+        {"a film on rough perfect metal", filmed(roughMetal(1, 1e6, 0.6), 500, 1.5), constant(1)},
+        {"a film on glass", filmed(glass(1.5, 1.5), 400, 1.33), constant(1)},
+        {"a film on dispersive glass", filmed(glass(1.7, 1.6), 400, 1.33), constant(1)},
+        {"a film on rough glass", filmed(roughGlass(1.5, 1.5, 0.6), 400, 2.2), constant(1)},
+        {"a film on dispersive rough glass", filmed(roughGlass(1.7, 1.6, 0.5), 400, 1.33), constant(1)},
+        {"plastic", plastic(0.6, 0), coated(0.6, 0), coat},
+        {"white plastic", plastic(1, 0), constant(1), coat},
+        {"black plastic", plastic(0, 0.5), coated(0, 0.5)},
+        {"rough plastic", plastic(0.6, 0.5), coated(0.6, 0.5)},
+        {"white rough plastic", plastic(1, 0.7), constant(1)},
+        {"plastic without a coat", plastic(0.7, 0.3, 1), constant(0.7)},
+    };
+}
+
+/// A triangle of one material, and its BSDF at a point.
+class Bench {
+public:
+    /// `normal`: what is interpolated.
+    explicit Bench(const Material& material, const Vec3d& normal = {0, 0, 1}) {
+        crt::Mesh mesh;
+        mesh.positions = {{-1, -1, 0}, {1, -1, 0}, {0, 1, 0}};  // its normal is +z
+        mesh.triangles = {{0, 1, 2}};
+        crt::Scene scene = sceneOf(mesh);
+        scene.materials = {material};
+        scene.objects[0].material = 0;
+        compiled_ = crt::compileScene(scene, 0);
+        ctx_ = contextOf(compiled_);
+        CrtHit hit = crt_no_hit(CRT_INFINITY);
+        hit.slot = hit.id = 0;
+        hit.b1 = hit.b2 = 0.3f;
+        surface_ = crt_surface(&ctx_, hit);
+        surface_.ns = toFloat(normal);
+    }
+    /// Of a path that carries the same at all wavelengths, or nothing but the hero's.
+    CrtBsdf prepare(const Vec3d& wo, bool alone = false) const {
+        return prepare(wo, alone ? make_vec4(0, 0, 4, 0) : splat4(1));
+    }
+    CrtBsdf prepare(const Vec3d& wo, vec4 carried) const {
+        CrtBsdf bsdf{};
+        crt_layered_prepare(&ctx_, &bsdf, &surface_, unitFloat(wo), positions(), carried, 1);
+        return bsdf;
+    }
+    /// The same as a vertex of a path.
+    CrtVertex vertex(const Vec3d& wo, bool alone = false) const {
+        CrtVertex vertex{};
+        vertex.surface = surface_;
+        vertex.wo = unitFloat(wo);
+        crt_vertex_prepare(&ctx_, &vertex, 0, positions(), alone ? make_vec4(0, 0, 4, 0) : splat4(1), 0, 1);
+        return vertex;
+    }
+    static constexpr u32 kHero = 2;
+    static CrtScatter sample(const CrtBsdf& bsdf, CrtRandom2 u, CrtRandom2 choice, int alone = 0) {
+        return crt_layered_sample(&bsdf, u, choice, make_vec4(0, 0, 1, 0), alone);
+    }
+    static CrtScatter sampleSurface(const CrtBsdf& bsdf, CrtRandom2 u, CrtRandom2 choice) {
+        return crt_surface_sample(&bsdf, u, choice, make_vec4(0, 0, 1, 0), 0);
+    }
+
+private:
+    static vec4 positions() {
+        return make_vec4(static_cast<f32>(kPositions[0]), static_cast<f32>(kPositions[1]),
+                         static_cast<f32>(kPositions[2]), static_cast<f32>(kPositions[3]));
+    }
+
+    crt::CompiledScene compiled_;
+    CrtContext ctx_{};
+    CrtSurface surface_{};
+};
+
+inline Vec3d spherical(double cosine, double phi) {
+    const double sine = std::sqrt(std::max(0.0, 1 - cosine * cosine));
+    return {sine * std::cos(phi), sine * std::sin(phi), cosine};
+}
+
+/// Directions of view, from both sides of the surface.
+inline std::vector<Vec3d> views() {
+    std::vector<Vec3d> all;
+    for (const double cosine : {0.98, 0.6, 0.2})
+        for (const double side : {1.0, -1.0}) all.push_back(spherical(side * cosine, 0.7));
+    return all;
+}
+
+/// Of two errors the worse, and NaN where one is none.
+inline double fartherFrom0(double a, double b) { return std::abs(b) <= a ? a : std::abs(b); }
+
+/// Chance of a single direction, of a flat surface.
+inline double chanceOfSingle(const CrtBsdf& b) {
+    double chance = (b.flags & CRT_BSDF_DELTA) != 0 ? 1 : 0;
+    if (b.type == CRT_MATERIAL_PLASTIC && b.coat == nullptr) chance = b.coat_chance;
+    if (crt_is_coated(&b))
+        chance = (1 - double{b.clear_chance}) * chance + (crt_is_coat_lobe(&b) ? 0 : b.clear_chance);
+    return crt_is_fuzzy(&b) ? (1 - double{b.fuzz_chance}) * chance : chance;
+}
+
+inline bool isDelta(const CrtBsdf& bsdf) { return crt_is_delta(&bsdf) != 0; }
+
+/// Integrals over cells of the sphere, equal in solid angle: cosine by azimuth.
+constexpr std::size_t kRows = 32, kColumns = 32, kCells = kRows * kColumns, kSteps = 24;
+constexpr std::size_t kSubRows = kRows * kSteps, kSubColumns = kColumns * kSteps;
+/// The directions of the quadrature, row by row: most of its time would be their sines.
+inline const std::vector<Vec3d>& cellDirections() {
+    static const std::vector<Vec3d> all = [] {
+        std::vector<Vec3d> directions;
+        for (std::size_t i = 0; i < kSubRows; ++i)
+            for (std::size_t j = 0; j < kSubColumns; ++j)
+                directions.push_back(
+                    spherical(-1 + 2 * (static_cast<double>(i) + 0.5) / kSubRows,
+                              -kPi + 2 * kPi * (static_cast<double>(j) + 0.5) / kSubColumns));
+        return directions;
+    }();
+    return all;
+}
+template <class F>
+std::array<double, kCells> overCells(const F& f) {
+    std::array<double, kCells> cells{};
+    const std::vector<Vec3d>& directions = cellDirections();
+    for (std::size_t i = 0; i < kSubRows; ++i)
+        for (std::size_t j = 0; j < kSubColumns; ++j)
+            cells[i / kSteps * kColumns + j / kSteps] +=
+                f(directions[i * kSubColumns + j]) * 4 * kPi / (static_cast<double>(kSubRows) * kSubColumns);
+    return cells;
+}
+inline std::size_t cellOf(const Vec3d& w) {
+    const auto at = [](double share, std::size_t n) {
+        return std::min(n - 1, static_cast<std::size_t>(std::max(0.0, share) * static_cast<double>(n)));
+    };
+    return at((w[2] + 1) / 2, kRows) * kColumns + at((std::atan2(w[1], w[0]) + kPi) / (2 * kPi), kColumns);
+}
+inline double total(const std::array<double, kCells>& cells) {
+    double sum = 0;
+    for (const double c : cells) sum += c;
+    return sum;
+}
+
+/// Over the whole square of random numbers; the second pair along with it, by the sequence R₂ (Roberts
+/// 2018).
+template <class F>
+void overNumbers(F&& f, u32 side = 512) {
+    for (u32 i = 0; i < side; ++i)
+        for (u32 j = 0; j < side; ++j) {
+            const double n = i * side + (j * 197 + i * 61) % side;
+            CrtRandom2 u, choice;
+            u.x = (static_cast<f32>(i) + 0.5f) / static_cast<f32>(side);
+            u.y = (static_cast<f32>(j) + 0.5f) / static_cast<f32>(side);
+            const double x = n * 0.7548776662466927, y = n * 0.5698402909980532;
+            choice.x = static_cast<f32>(x - std::floor(x));
+            choice.y = static_cast<f32>(y - std::floor(y));
+            f(u, choice, 1.0 / (static_cast<double>(side) * side));
+        }
+}
+
+}  // namespace bsdf_test
