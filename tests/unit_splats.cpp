@@ -209,7 +209,7 @@ TEST_CASE("a film has splats where it has their scale, a power of two", "[splats
     CHECK(Film(kReplicated).splats.size() == 6 * 13);
 }
 
-TEST_CASE("replicates tell the error of splats; without them it is unknown", "[splats]") {
+TEST_CASE("replicates tell the error of splats, and without them it is unknown", "[splats]") {
     Film film = filmWith(kReplicated, {0, 64}, 64), plain = filmWith(kPlain, {0, 64}, 64);
     std::mt19937 generator(9);
     std::normal_distribution<float> noise(10, 1);

@@ -246,8 +246,12 @@ CRT_FN vec4 crt_where_less4(vec4 a, vec4 b, vec4 x, vec4 y) {
 #define CRT_FN static inline
 #define CRT_ROLLED _Pragma("GCC unroll 1") /* before a loop whose body is too long to repeat */
 #define CRT_TWICE _Pragma("GCC unroll 2")  /* before one whose turns are to overlap */
+#ifdef __OPTIMIZE_SIZE__
+#define CRT_HOT_FN CRT_FN
+#else
 #define CRT_HOT_FN /* so short, or called so often, that a call costs 1 % of a render or more */ \
     __attribute__((always_inline)) static inline
+#endif
 #define CRT_CALLED_FN \
     __attribute__((noinline, unused)) static /* long, with many callers; or seldom called */
 #define CRT_SHARED_FN CRT_FN
