@@ -84,7 +84,7 @@ Session& Context::sessionFor(const Render& how) {
     const bool usual = how.kernel == CRT_KERNEL_LEAN && how.threads == 0 && how.tile_size == 0;
     if (usual && usual_) return *usual_;
     IntegratorOptions options = options_;
-    options.kernel = how.kernel;
+    if (how.kernel != CRT_KERNEL_LEAN) options.kernel = how.kernel;
     if (how.threads != 0) options.threads = how.threads;
     options.tile_size = how.tile_size;
     // One at a time: a limit of threads holds for the process while its integrator lives.

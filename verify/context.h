@@ -25,7 +25,7 @@ struct Render {
     std::uint64_t first_sample = 0;
     std::optional<std::uint64_t> seed{};  ///< Instead of the scene's.
     std::uint32_t aovs = 0;
-    CrtKernelChoice kernel = CRT_KERNEL_LEAN;
+    CrtKernelChoice kernel = CRT_KERNEL_LEAN;  ///< LEAN: as the suite is asked to, which is lean by default.
     unsigned threads = 0;
     unsigned tile_size = 0;
     bool squares = false;  ///< One sequence, whose film has the variance of its paths (pathVariance).

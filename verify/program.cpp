@@ -189,6 +189,14 @@ unsigned threadsOf(const std::string& text) {
     return static_cast<unsigned>(*count.value);
 }
 
+CrtKernelChoice kernelOf(const std::string& text) {
+    const std::optional<CrtKernelChoice> kernel = kernelNamed(text);
+    if (!kernel)
+        throw Error(ErrorKind::Usage,
+                    fmt::format("--kernel takes one of {}, not '{}'", fmt::join(kKernelWords, ", "), text));
+    return *kernel;
+}
+
 Level levelOf(const std::string& text) {
     const std::optional<Level> level = levelNamed(text);
     if (!level)
@@ -205,7 +213,7 @@ struct Word {
 };
 
 // `crt verify` describes them (core/cli/verify_command.cpp) and checks what it passes on.
-constexpr std::array<Word, 12> kWords{{
+constexpr std::array<Word, 13> kWords{{
     {"--case", nullptr, [](Arguments& a, const std::string& text) { a.cases.push_back(text); }},
     {"--level", nullptr, [](Arguments& a, const std::string& text) { a.level = levelOf(text); }},
     {"--part", nullptr, [](Arguments& a, const std::string& text) { readPart(text, a); }},
@@ -215,6 +223,8 @@ constexpr std::array<Word, 12> kWords{{
     {"--device", nullptr, [](Arguments& a, const std::string& text) { a.integrator.device = text; }},
     {"--threads", nullptr,
      [](Arguments& a, const std::string& text) { a.integrator.threads = threadsOf(text); }},
+    {"--kernel", nullptr,
+     [](Arguments& a, const std::string& text) { a.integrator.kernel = kernelOf(text); }},
     {"--output", nullptr, [](Arguments& a, const std::string& text) { a.output = text; }},
     {"--quiet", [](Arguments& a) { a.quiet = true; }, nullptr},
     {"--markdown", [](Arguments& a) { a.markdown = true; }, nullptr},

@@ -7,13 +7,11 @@
 #include "kernel/dialect/layout.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <exception>
 #include <limits>
 #include <mutex>
-#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -286,6 +284,12 @@ Integrator::Integrator(const LoadedBackend& backend, const IntegratorOptions& op
 Integrator::~Integrator() = default;
 Integrator::Integrator(Integrator&&) noexcept = default;
 Integrator& Integrator::operator=(Integrator&&) noexcept = default;
+
+std::optional<CrtKernelChoice> kernelNamed(std::string_view word) {
+    const auto found = std::find(kKernelWords.begin(), kKernelWords.end(), word);
+    if (found == kKernelWords.end()) return std::nullopt;
+    return static_cast<CrtKernelChoice>(found - kKernelWords.begin());
+}
 
 CompileOptions compileOptionsFor(const LoadedBackend& backend) {
     return {.accelerator_reach = acceleratorReach(backend)};

@@ -6,10 +6,13 @@
 #include "compile/compile.h"
 #include "film/film.h"
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
+#include <string_view>
 
 namespace crt {
 
@@ -21,6 +24,11 @@ struct IntegratorOptions {
     unsigned tile_size = 0;       ///< 0: the backend's own.
     bool use_cache = true;
 };
+
+/// The words for a kernel, at the place of their CrtKernelChoice.
+inline constexpr std::array<std::string_view, 3> kKernelWords{"lean", "full", "lean-only"};
+/// Nothing for another word.
+std::optional<CrtKernelChoice> kernelNamed(std::string_view word);
 
 /// The parts that a scene for this backend may lack.
 CompileOptions compileOptionsFor(const LoadedBackend& backend);

@@ -41,21 +41,10 @@ OptionGroup what(Job& job) {
 }
 
 OptionGroup where(Job& job) {
-    const std::vector<std::string> kernels{"lean", "full", "lean-only"};
     return {
         "Device",
         {backendOption(job.backend), deviceOption(job.integrator), threadsOption(job.integrator),
-         {.names = "--kernel",
-          .placeholder = "KIND",
-          .help = "lean: for this scene only; full: all features; lean-only: waits for the compiler; same "
-                  "bits",
-          .read = [&job](const std::string& text) {
-              job.integrator.kernel = text == "full"        ? CRT_KERNEL_FULL
-                                      : text == "lean-only" ? CRT_KERNEL_LEAN_ONLY
-                                                            : CRT_KERNEL_LEAN;
-          },
-          .completion = completeWord(kernels),
-          .choices = kernels},
+         kernelOption(job.integrator),
          {.names = "--tile",
           .placeholder = "N",
           .help = "pixels along the side of a tile; never changes the image",

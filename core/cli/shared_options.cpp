@@ -59,6 +59,17 @@ Option threadsOption(IntegratorOptions& integrator) {
             }};
 }
 
+Option kernelOption(IntegratorOptions& integrator) {
+    const std::vector<std::string> words(kKernelWords.begin(), kKernelWords.end());
+    return {
+        .names = "--kernel",
+        .placeholder = "KIND",
+        .help = "lean: for this scene only; full: all features; lean-only: waits for the compiler; same bits",
+        .read = [&integrator](const std::string& text) { integrator.kernel = kernelNamed(text).value(); },
+        .completion = completeWord(words),
+        .choices = words};
+}
+
 Option exposeOption(bool& automatically) {
     return {.names = "--expose",
             .placeholder = "auto",

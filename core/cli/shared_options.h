@@ -23,6 +23,7 @@ Option backendOption(std::string& backend);
 
 Option deviceOption(IntegratorOptions& integrator);
 Option threadsOption(IntegratorOptions& integrator);
+Option kernelOption(IntegratorOptions& integrator);
 
 /// --expose auto.
 Option exposeOption(bool& automatically);

@@ -74,7 +74,7 @@ OptionGroup ofWhom(Request& to) {
                       .read = {},
                       .completion = {Completion::Kind::Folder}},
                      deviceOption(to.integrator),
-                     threadsOption(to.integrator)},
+                     threadsOption(to.integrator), kernelOption(to.integrator)},
                     to);
 }
 
