@@ -8,9 +8,11 @@
 
 #include "base/error.h"
 #include "base/temporary_folder.h"
+#include "base/words.h"
 #include "captured_log.h"
 #include "image/image_io.h"
 #include "scene/textures/texture_files.h"
+#include "scene/yaml/scene_schema_textures.h"
 #include "scene/yaml/scene_yaml.h"
 #include "spectra/sigmoid.h"
 
@@ -322,6 +324,35 @@ TEST_CASE("checkers alternate, also below zero, and may be made of textures", "[
     // Spectra of its values are in the scene's table.
     const Probe colored(squareWith("{checker: [{rgb: [0.7, 0.2, 0.1], space: linear}, 0.5]}"));
     CHECK(distance(colored.color(0.5, 0.5), {0.7, 0.2, 0.1}) < 1e-3);
+}
+
+TEST_CASE("the numbers of a pattern are keys of scene files, and in the blob", "[texture]") {
+    // The others are images and attributes.
+    CHECK(crt::schemaVariants("texture").size() == std::size(crt::kPatternWords) + 2);
+    for (const auto& [kind, word] : crt::kPatternWords) {
+        INFO(word);
+        const crt::SectionSchema& section = crt::schemaSection(std::string("texture/") + word);
+        CHECK(section.keys.front().name == word);
+        for (const crt::KeySchema& key : crt::numbersOfPattern(section)) {
+            INFO(key.name);
+            CHECK(key.kind == crt::ValueKind::Number);
+            CHECK(key.shape == crt::ValueShape::One);
+            CHECK(crt::parseNumber(key.fallback).value);
+        }
+        Scene scene = sceneOf(squareWith(fmt::format("{{{}: [0.25, 0.75]}}", word)));
+        CHECK(scene.textures[0].kind == kind);
+        CHECK(scene.textures[0].numbers.size() == crt::numbersOfPattern(section).size());
+        scene.textures[0].numbers = {0.375, -2};
+        const CompiledScene compiled = crt::compileScene(scene, 0);
+        const CrtTexture& record = *CRT_ARRAY(CrtTexture, compiled.data(), compiled.header().textures);
+        REQUIRE(record.words.count == 4);
+        const f32* numbers = CRT_ARRAY(f32, compiled.data(), record.words);
+        CHECK(numbers[0] == 0.375f);
+        CHECK(numbers[1] == -2.0f);
+        const std::string hash = compiled.hash;
+        scene.textures[0].numbers[1] = 2;
+        CHECK(crt::compileScene(scene, 0).hash != hash);
+    }
 }
 
 TEST_CASE("colours of vertices, linear in between at every wavelength", "[texture]") {

@@ -202,7 +202,7 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
                        [](const FlatShape& shape) { return shape.record; });
     });
 
-    header.features = featuresOf(scene, header, materials);
+    header.features = featuresOf(scene, header, materials, texture_part);
     warnOfUnseenLights(scene, header);
     decodeTextures(texture_part, blob);  // into the blob, which does not move any more
 

@@ -26,8 +26,9 @@ bool scatters(const Scene& scene) { return isOfLight(scene) && scene.integrator.
 
 }  // namespace
 
-std::uint64_t featuresOf(const Scene& scene, const kernel::CrtScene& header, const MaterialPart& materials) {
-    std::uint64_t f = 0;
+std::uint64_t featuresOf(const Scene& scene, const kernel::CrtScene& header, const MaterialPart& materials,
+                         const TexturePart& textures) {
+    std::uint64_t f = textures.features;
     const auto need = [&](bool condition, std::uint64_t feature) { f |= condition ? feature : 0; };
     need(header.sampler == CRT_SAMPLER_SOBOL, CRT_FEATURE_SOBOL);
     need(header.sampler == CRT_SAMPLER_INDEPENDENT, CRT_FEATURE_INDEPENDENT);
@@ -59,7 +60,6 @@ std::uint64_t featuresOf(const Scene& scene, const kernel::CrtScene& header, con
          CRT_FEATURE_POINT_LIGHT);
     need((f & CRT_FEATURE_NEE) != 0 && header.tree_lights != 0, CRT_FEATURE_LIGHT_TREE);
     need(header.spectra.count > 0, CRT_FEATURE_TABLE);
-    need(header.textures.count > 0, CRT_FEATURE_TEXTURE);
     need(header.camera.lens_radius > 0, CRT_FEATURE_LENS);
     need(header.filter.count > 0, CRT_FEATURE_FILTER);
     f |= rowOf(scene.integrator.type).features;
@@ -93,6 +93,10 @@ LeftOut leftOut(const Scene& scene, const kernel::CrtScene& header, std::size_t 
 #undef CRT_LEFT_OUT_MATERIAL
     if (!has(CRT_FEATURE_TABLE)) left_out("tables of spectra", "all values are the same at all wavelengths");
     if (!has(CRT_FEATURE_TEXTURE)) left_out("textures", "no value depends on the place");
+#define CRT_LEFT_OUT_PATTERN(number, NAME, Name, word, KERNELS) \
+    if (has(CRT_FEATURE_TEXTURE) && !has(CRT_FEATURE_##KERNELS)) left_out(#word, "no texture is one");
+    CRT_PATTERN_LIST(CRT_LEFT_OUT_PATTERN)
+#undef CRT_LEFT_OUT_PATTERN
     if (!has(CRT_FEATURE_DISPERSION))
         left_out("hero wavelength selection", "no index of refraction depends on wavelength");
     if (!has(CRT_FEATURE_MEDIA)) left_out("absorption", "no body absorbs");

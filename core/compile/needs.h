@@ -3,6 +3,7 @@
 #pragma once
 
 #include "compile/materials.h"
+#include "compile/textures.h"
 #include "kernel/dialect/layout.h"
 #include "scene/scene.h"
 
@@ -15,7 +16,8 @@
 namespace crt {
 
 /// `header` is complete but for its features.
-std::uint64_t featuresOf(const Scene& scene, const kernel::CrtScene& header, const MaterialPart& materials);
+std::uint64_t featuresOf(const Scene& scene, const kernel::CrtScene& header, const MaterialPart& materials,
+                         const TexturePart& textures);
 
 /// A feature that is left out, and the reason.
 using LeftOut = std::vector<std::pair<std::string, std::string>>;

@@ -75,12 +75,12 @@ std::string sceneIdentity(const unsigned char* blob, const std::vector<std::arra
         hash.add(CRT_ARRAY(CrtTriangle, blob, header.triangles) + header.triangle_count,
                  header.triangles.count - header.triangle_count, sizeof(CrtTriangle));
     }
-    // A texture names its texels by their place in the blob.
+    // A texture names its texels, or its numbers, by their place in the blob.
     const CrtTexture* textures = CRT_ARRAY(CrtTexture, blob, header.textures);
     for (std::uint32_t i = 0; i < header.textures.count; ++i) {
         CrtTexture texture = textures[i];
-        hash.add(CRT_ARRAY(u16, blob, texture.texels), texture.texels.count, sizeof(u16));
-        texture.texels = {};
+        hash.add(CRT_ARRAY(u16, blob, texture.words), texture.words.count, sizeof(u16));
+        texture.words = {};
         hash.add(&texture, 1, sizeof texture);
     }
     // The losses follow from the materials; a record names its rows by their place in the blob.

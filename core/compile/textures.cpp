@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cstring>
 #include <map>
 
 namespace crt {
@@ -24,19 +25,26 @@ void setTransform(const Texture& texture, kernel::CrtTexture& record) {
     }
 }
 
-std::uint32_t kindOf(const Texture& texture) {
-    switch (texture.kind) {
-        case Texture::Kind::Image:
-            switch (texture.image->kind) {
-                case TexelKind::Spectra: return CRT_TEXTURE_SPECTRA;
-                case TexelKind::Numbers: return CRT_TEXTURE_NUMBERS;
-                case TexelKind::Normals: return CRT_TEXTURE_NORMALS;
-            }
-            break;
-        case Texture::Kind::Checker: return CRT_TEXTURE_CHECKER;
-        case Texture::Kind::VertexColors: break;
+/// Does not compile where two kinds have one number.
+std::uint64_t featuresOf(std::uint32_t kind) {
+    switch (kind) {
+        case CRT_TEXTURE_SPECTRA:
+        case CRT_TEXTURE_NUMBERS:
+        case CRT_TEXTURE_VERTICES:
+        case CRT_TEXTURE_NORMALS: break;
+#define CRT_PATTERN_FEATURE(number, NAME, Name, word, KERNELS) \
+    case CRT_TEXTURE_##NAME: return CRT_FEATURE_TEXTURE | CRT_FEATURE_##KERNELS;
+            CRT_PATTERN_LIST(CRT_PATTERN_FEATURE)
+#undef CRT_PATTERN_FEATURE
     }
-    return CRT_TEXTURE_VERTICES;
+    return CRT_FEATURE_TEXTURE;
+}
+
+kernel::CrtSpan appendNumbers(const std::vector<double>& numbers, BlobWriter& blob) {
+    const std::vector<float> rounded(numbers.begin(), numbers.end());
+    return blob.appendFilled<std::uint16_t>(2 * rounded.size(), [&](std::span<std::uint16_t> words) {
+        std::memcpy(words.data(), rounded.data(), words.size_bytes());
+    });
 }
 
 }  // namespace
@@ -49,7 +57,7 @@ std::vector<TextureIndex> usedTextures(const Scene& scene, const std::vector<con
     for (const Material* material : materials)
         if (material)
             for (const TextureIndex index : material->textures()) use(index);
-    // From the last on: what a checker is made of comes before it.
+    // From the last on: what a pattern is made of comes before it.
     std::vector<TextureIndex> all;
     for (std::size_t i = used.size(); i-- > 0;) {
         if (!used[i]) continue;
@@ -78,10 +86,11 @@ TexturePart compileTextures(const Scene& scene, const std::vector<TextureIndex>&
     for (const TextureIndex index : textures) {
         const Texture& texture = at(scene, index);
         kernel::CrtTexture record{};
-        record.kind = kindOf(texture);
+        record.kind = static_cast<std::uint32_t>(texture.kind);
         setTransform(texture, record);
         if (texture.kind == Texture::Kind::Image) {
             const TextureImage& image = *texture.image;
+            record.kind = static_cast<std::uint32_t>(image.kind);
             record.width = image.width;
             record.height = image.height;
             record.wrap = static_cast<std::uint32_t>(texture.wrap);
@@ -92,15 +101,17 @@ TexturePart compileTextures(const Scene& scene, const std::vector<TextureIndex>&
                 part.images.emplace_back(&image, known->second);
                 part.texel_bytes += image.words() * sizeof(std::uint16_t);
             }
-            record.texels = known->second;
-        } else if (texture.kind == Texture::Kind::Checker) {
+            record.words = known->second;
+        } else if (texture.kind != Texture::Kind::VertexColors) {
             const auto valueOf = [&](const TextureValue& value) {
                 return value.texture != kNoTexture ? part.valueOf(value.texture)
                                                    : spectra.valueOf(value.spectrum);
             };
-            record.even = valueOf(texture.values[0]);
-            record.odd = valueOf(texture.values[1]);
+            record.first = valueOf(texture.values[0]);
+            record.second = valueOf(texture.values[1]);
+            record.words = appendNumbers(texture.numbers, blob);
         }
+        part.features |= featuresOf(record.kind);
         part.record_of[static_cast<std::size_t>(index)] = static_cast<std::uint32_t>(part.records.size());
         part.records.push_back(record);
     }

@@ -12,7 +12,7 @@
 
 namespace crt {
 
-/// The textures of the scene that the materials name, and those of their checkers, in the scene's order.
+/// The textures of the scene that the materials name, and those of their patterns, in the scene's order.
 std::vector<TextureIndex> usedTextures(const Scene& scene, const std::vector<const Material*>& materials);
 
 /// That their images take in the blob.
@@ -21,6 +21,7 @@ std::uint64_t texelBytes(const Scene& scene, const std::vector<TextureIndex>& te
 struct TexturePart {
     std::vector<kernel::CrtTexture> records;
     std::vector<std::uint32_t> record_of;  ///< By the scene's number.
+    std::uint64_t features = 0;            ///< That kernels need for them.
     std::vector<std::pair<const TextureImage*, kernel::CrtSpan>> images;  ///< Each once.
     std::uint64_t texel_bytes = 0;
 
@@ -28,7 +29,7 @@ struct TexturePart {
         return CRT_VALUE_TEXTURE | record_of[static_cast<std::size_t>(texture)];
     }
 };
-/// Makes room in the blob for the texels, each image once.
+/// Puts the numbers of patterns into the blob, and makes room there for the texels, each image once.
 TexturePart compileTextures(const Scene& scene, const std::vector<TextureIndex>& textures,
                             SpectrumTable& spectra, BlobWriter& blob);
 

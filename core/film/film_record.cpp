@@ -176,7 +176,7 @@ SceneTrait materialsTrait(const Scene& scene) {
 
 /// Of images their names and sizes: their texels are read by compilation alone.
 void addTexture(Digest& digest, const Texture& texture) {
-    const auto& [kind, image, filter, wrap, values, transform, of_opacity, place] = texture;
+    const auto& [kind, image, filter, wrap, values, numbers, transform, of_opacity, place] = texture;
     digest.add(kind);
     digest.add(filter);
     digest.add(wrap);
@@ -184,6 +184,7 @@ void addTexture(Digest& digest, const Texture& texture) {
         digest.add(value.spectrum);
         digest.add(value.texture);
     }
+    for (const double number : numbers) digest.add(number);
     for (const double number : transform) digest.add(number);
     if (!image) return;
     if (of_opacity) digest.add(of_opacity);

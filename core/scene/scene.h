@@ -373,7 +373,7 @@ struct Scene {
     IntegratorSettings integrator;
     SamplerSettings sampler;
     std::vector<Material> materials;
-    std::vector<Texture> textures;  ///< Those of a checker before it.
+    std::vector<Texture> textures;  ///< Those of a pattern before it.
     std::vector<Emission> emissions;
     std::vector<Mesh> meshes;
     std::vector<Object> objects;

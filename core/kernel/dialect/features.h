@@ -10,6 +10,11 @@
  * material. Its bit is its number in the scene, too; `word` is its type in scene files. SCATTER is LOBE
  * where light that arrives from any direction may be scattered, so that it is worth sampling lights, and
  * DELTA where only that of single directions is. A material may have both: it is LOBE.
+ *
+ * CRT_PATTERN_LIST(P) calls P(number, NAME, Name, word, KERNELS) for each pattern: a texture that has one
+ * of two values at each place. `number` is its kind in the scene, which no other texture has; `word` is its
+ * key in scene files, and crt_<word> its function (values/texture.h); KERNELS is the feature of the kernels
+ * that have it.
  */
 #ifndef CRT_FEATURES_H
 #define CRT_FEATURES_H
@@ -25,6 +30,8 @@
       "rough dielectric (GGX), refraction by microfacets")                                   \
     M(F, 24, THIN_DIELECTRIC, ThinDielectric, thin_dielectric, DELTA, "thin panes")          \
     M(F, 25, PLASTIC, Plastic, plastic, LOBE, "diffuse base under a clear coat")
+
+#define CRT_PATTERN_LIST(P) P(2, CHECKER, Checker, checker, TEXTURE)
 
 #define CRT_MATERIAL_FEATURE(F, bit, NAME, Name, word, scatter, text) F(bit, NAME, text)
 #define CRT_FEATURE_LIST(F)                                                                  \
@@ -48,7 +55,7 @@
     F(20, TABLE, "values tabulated by wavelength")                                           \
     F(22, ENVIRONMENT_LIGHT, "light sampling of the environment")                            \
     F(26, MEDIA, "what bodies of glass hold: absorption, holes in their surface")            \
-    F(27, TEXTURE, "values that depend on the place: images, checkers, colours of vertices") \
+    F(27, TEXTURE, "values that depend on the place: images, patterns, colours of vertices") \
     F(28, POINT_LIGHT, "points, spots, directional lights, suns, IES lamps, beams")          \
     F(29, ENVIRONMENT_IMAGE, "environment that depends on the direction")                    \
     F(30, THIN_FILM, "thin films")                                                           \
@@ -88,6 +95,16 @@ enum CrtMaterialType { CRT_MATERIAL_LIST(CRT_MATERIAL_ENUM, ) };
 #define CRT_MATERIAL_NUMBERS 64 /* above every kind's: it is a bit of a mask */
 #define CRT_FEATURES_MATERIALS (0ul CRT_MATERIAL_LIST(CRT_MATERIAL_BIT, ))
 #define CRT_FEATURES_LOBE (0ul CRT_MATERIAL_LIST(CRT_LOBE_BIT, ))
+
+/* Kinds of textures. */
+#define CRT_PATTERN_ENUM(number, NAME, Name, word, KERNELS) CRT_TEXTURE_##NAME = number,
+enum CrtTextureKind {
+    CRT_TEXTURE_SPECTRA = 0,  /* an image of spectra: three words a texel (texture.h) */
+    CRT_TEXTURE_NUMBERS = 1,  /* an image of numbers: one word a texel, of 65535 */
+    CRT_TEXTURE_VERTICES = 3, /* between the colours of the vertices */
+    CRT_TEXTURE_NORMALS = 4,  /* an image of directions: three words a texel, −1 to 1. Not a value */
+    CRT_PATTERN_LIST(CRT_PATTERN_ENUM)
+};
 
 /* The mask that this kernel is compiled for; everything when the build says nothing. */
 #ifndef CRT_FEATURES

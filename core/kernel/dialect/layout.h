@@ -193,27 +193,21 @@ typedef u32 CrtValue;
 #define CRT_VALUE_TABLE 0x80000000u /* kind 0: a spectrum of the scene's table */
 #define CRT_VALUE_TEXTURE 0x90000000u /* kind 1: depends on the place: an entry of the scene's textures */
 
-#define CRT_TEXTURE_SPECTRA 0u  /* an image of spectra: three words a texel (texture.h) */
-#define CRT_TEXTURE_NUMBERS 1u  /* an image of numbers: one word a texel, of 65535 */
-#define CRT_TEXTURE_CHECKER 2u  /* squares of two values */
-#define CRT_TEXTURE_VERTICES 3u /* between the colours of the vertices */
-#define CRT_TEXTURE_NORMALS 4u  /* an image of directions: three words a texel, −1 to 1. Not a value */
-
 #define CRT_WRAP_REPEAT 0u
 #define CRT_WRAP_MIRROR 1u
 #define CRT_WRAP_CLAMP 2u
 
 /* A value that depends on the place. Members that a kind does not use are 0. */
 typedef struct CrtTexture {
-    u32 kind; /* CRT_TEXTURE_… */
+    u32 kind; /* CRT_TEXTURE_… of features.h */
     u32 width, height;
     u32 wrap;    /* CRT_WRAP_…: what lies beyond the image */
     u32 nearest; /* 1: the texel that a place lies in; 0: bilinear between the four around it */
-    CrtValue even, odd; /* checker; entries before this one where they are textures */
+    CrtValue first, second; /* of a pattern; entries before this one where they are textures */
     u32 reserved;
-    CrtSpan texels; /* words of 16 bits, the top row first */
+    CrtSpan words; /* of 16 bits: the texels of an image, the top row first; of a pattern its numbers, f32 */
     f32 from_uv[6]; /* (s, t) = (f0 u + f1 v + f2, f3 u + f4 v + f5): of images the upper left corner is
-                       (0, 0), the lower right (1, 1); squares of a checker have side 1 */
+                       (0, 0), the lower right (1, 1) */
 } CrtTexture;
 CRT_ASSERT_SIZE(CrtTexture, 64);
 

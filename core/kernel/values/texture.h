@@ -1,5 +1,5 @@
 /*
- * texture.h: values that depend on the place on a surface: images, checkers, colours of vertices.
+ * texture.h: values that depend on the place on a surface: images, patterns, colours of vertices.
  *
  * Between texels and between vertices, spectra are interpolated, not the coefficients that they are made of:
  * those of black and white are so large that half-way between them is no grey.
@@ -60,7 +60,7 @@ CRT_FN vec4 crt_texel_spectrum(CRT_GLOBAL const u16 *texel, vec4 position) {
 }
 
 CRT_FN vec4 crt_texel(const CrtContext *ctx, const CrtTexture *texture, i32 x, i32 y, vec4 position) {
-    CRT_GLOBAL const u16 *words = CRT_ARRAY(u16, ctx->blob, texture->texels);
+    CRT_GLOBAL const u16 *words = CRT_ARRAY(u16, ctx->blob, texture->words);
     const u64 index = (u64)(u32)y * texture->width + (u32)x;
     if (CRT_HAS(NORMAL_MAP) && texture->kind == CRT_TEXTURE_NORMALS) {
         CRT_GLOBAL const u16 *n = words + index * 3u;
@@ -101,12 +101,15 @@ CRT_FN vec4 crt_image(const CrtContext *ctx, const CrtTexture *texture, const Cr
     return crt_mix4(upper, lower, y.f);
 }
 
-/* The value of the square: `even` where its two numbers, counted from the square at (0, 0), have an even
-   sum. */
-CRT_FN CrtValue crt_checker(const CrtTexture *texture, const CrtFacePlace *at) {
-    const CrtTexturePlace place = crt_texture_place(texture, at);
-    const f32 half_sum = 0.5f * (crt_floor(place.s) + crt_floor(place.t));
-    return crt_floor(half_sum) == half_sum ? texture->even : texture->odd;
+/* Patterns: crt_<word> of CRT_PATTERN_LIST returns 0 where the pattern has its first value, 1 where it has
+   the second. `numbers`: those of its keys, in the order of the schema. */
+
+/* Squares of side 1: the first value where the two numbers of a square, counted from that at (0, 0), have an
+   even sum. */
+CRT_FN int crt_checker(CrtTexturePlace at, CRT_GLOBAL const f32 *numbers) {
+    (void)numbers;
+    const f32 half_sum = 0.5f * (crt_floor(at.s) + crt_floor(at.t));
+    return crt_floor(half_sum) != half_sum;
 }
 
 CRT_FN vec4 crt_vertex_color(const CrtContext *ctx, const CrtFacePlace *at, vec4 position) {
@@ -119,18 +122,24 @@ CRT_FN vec4 crt_vertex_color(const CrtContext *ctx, const CrtFacePlace *at, vec4
 
 CRT_FN int crt_is_texture(CrtValue value) { return (value & CRT_VALUE_KIND) == CRT_VALUE_TEXTURE; }
 
-/* Resolves nested checkers to the value at a place. */
-CRT_FN CrtValue crt_resolve_checker(const CrtContext *ctx, CrtValue value, const CrtFacePlace *at) {
+#define CRT_PATTERN_CHOOSES(number, NAME, Name, word, KERNELS)                                          \
+    if (CRT_HAS(KERNELS) && texture.kind == CRT_TEXTURE_##NAME)                                         \
+        second = crt_##word(crt_texture_place(&texture, at), CRT_ARRAY(f32, ctx->blob, texture.words)); \
+    else
+
+/* Resolves nested patterns to the value at a place. */
+CRT_FN CrtValue crt_resolve_pattern(const CrtContext *ctx, CrtValue value, const CrtFacePlace *at) {
     while (crt_is_texture(value)) {
         const CrtTexture texture =
             CRT_ARRAY(CrtTexture, ctx->blob, ctx->scene->textures)[value & CRT_VALUE_INDEX];
-        if (texture.kind != CRT_TEXTURE_CHECKER) break;
-        value = crt_checker(&texture, at);
+        int second;
+        CRT_PATTERN_LIST(CRT_PATTERN_CHOOSES) break;
+        value = second ? texture.second : texture.first;
     }
     return value;
 }
 
-/* Neither number, nor table, nor checker. Called from wherever a material has a value; everything by value,
+/* Neither number, nor table, nor pattern. Called from wherever a material has a value; everything by value,
    so that none of it has to lie in memory. */
 CRT_CALLED_FN vec4 crt_texture(CrtContext ctx, u32 index, CrtFacePlace at, vec4 position) {
     const CrtTexture texture = CRT_ARRAY(CrtTexture, ctx.blob, ctx.scene->textures)[index];

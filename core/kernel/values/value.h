@@ -13,7 +13,7 @@ CRT_KERNEL_BEGIN
    0 where there is none, as for the environment, whose values do not depend on a place. */
 CRT_FN vec4 crt_value(const CrtContext *ctx, CrtValue value, const CrtSurface *surface, vec4 position) {
     if (CRT_HAS(TEXTURE) && surface != 0) {
-        value = crt_resolve_checker(ctx, value, &surface->at);
+        value = crt_resolve_pattern(ctx, value, &surface->at);
         if (crt_is_texture(value)) return crt_texture(*ctx, value & CRT_VALUE_INDEX, surface->at, position);
     }
     if (CRT_HAS(TABLE)) {

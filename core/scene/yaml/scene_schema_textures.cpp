@@ -3,6 +3,7 @@
 #include "scene/yaml/scene_schema_values.h"
 
 #include <string>
+#include <utility>
 
 namespace crt {
 namespace {
@@ -44,7 +45,28 @@ SectionSchema with(SectionSchema section, const std::vector<KeySchema>& keys) {
     return section;
 }
 
+/// A pattern (CRT_PATTERN_LIST) by its word and its numbers, each with a range and a default.
+SectionSchema pattern(const std::string& word, std::string title, std::string doc, std::string values,
+                      const std::vector<KeySchema>& numbers = {}) {
+    SectionSchema section{"texture/" + word,
+                          std::move(title),
+                          std::move(doc),
+                          {{.name = word,
+                            .kind = Kind::Spectrum,
+                            .shape = Shape::List,
+                            .count_min = 2,
+                            .count_max = 2,
+                            .section = "texture",
+                            .required = true,
+                            .doc = std::move(values) + " Each may be a texture."}}};
+    return with(with(std::move(section), numbers), transformKeys());
+}
+
 }  // namespace
+
+std::span<const KeySchema> numbersOfPattern(const SectionSchema& section) {
+    return std::span(section.keys).subspan(1, section.keys.size() - 1 - transformKeys().size());
+}
 
 void addTextures(std::vector<SectionSchema>& all) {
     all.push_back(with(
@@ -103,20 +125,10 @@ void addTextures(std::vector<SectionSchema>& all) {
            .fallback = "repeat",
            .doc = "Beyond the image: the image again, the image mirrored, or its edge."}}},
         transformKeys()));
-    all.push_back(with({"texture/checker",
-                        "a checker",
-                        "A checkerboard of two values with squares of side 1 in u and v, on a surface "
-                        "with texture coordinates.",
-                        {{.name = "checker",
-                          .kind = Kind::Spectrum,
-                          .shape = Shape::List,
-                          .count_min = 2,
-                          .count_max = 2,
-                          .section = "texture",
-                          .required = true,
-                          .doc = "The value of the square from (0, 0) to (1, 1), and of its neighbours. "
-                                 "Each may be a texture."}}},
-                       transformKeys()));
+    all.push_back(pattern("checker", "a checker",
+                          "A checkerboard of two values with squares of side 1 in u and v, on a surface "
+                          "with texture coordinates.",
+                          "The value of the square from (0, 0) to (1, 1), and of its neighbours."));
     all.push_back({"texture/attribute",
                    "an attribute",
                    "Values at the vertices of a mesh, with linear interpolation at every wavelength.",

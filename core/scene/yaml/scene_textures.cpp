@@ -1,6 +1,8 @@
 #include "scene/yaml/scene_textures.h"
 
+#include "base/words.h"
 #include "scene/yaml/degrees.h"
+#include "scene/yaml/scene_schema_textures.h"
 
 #include <fmt/format.h>
 
@@ -12,17 +14,25 @@
 #include <vector>
 
 namespace crt {
+namespace {
+
+/// A number cannot be a map of another kind: let a misspelt texture be told as one.
+bool isForm(const YamlNode& node, bool of_number) {
+    if (node.kind != YamlKind::Map) return false;
+    for (const SectionSchema* variant : schemaVariants("texture"))
+        if (node.find(variantWord(*variant)) != nullptr) return true;
+    return of_number;
+}
+
+}  // namespace
+
 TextureReader::TextureReader(Diagnostics& out, SceneFiles& files, SpectrumReader& spectra, GltfFiles& gltf,
                              Scene& scene)
     : out_(out), files_(files), spectra_(spectra), gltf_(gltf), scene_(scene) {}
 
 bool TextureReader::isTexture(const SectionReader& section, std::string_view key) {
     const YamlEntry* entry = section.find(key);
-    if (entry == nullptr || entry->value->kind != YamlKind::Map) return false;
-    for (const SectionSchema* variant : schemaVariants("texture"))
-        if (entry->value->find(variantWord(*variant)) != nullptr) return true;
-    // A number cannot be a map of another kind: let a misspelt texture be told as one.
-    return section.schema().find(key)->kind == ValueKind::Number;
+    return entry != nullptr && isForm(*entry->value, section.schema().find(key)->kind == ValueKind::Number);
 }
 
 std::optional<TextureIndex> TextureReader::read(const SectionReader& section, std::string_view key,
@@ -48,10 +58,10 @@ std::optional<TextureIndex> TextureReader::readForm(const YamlNode& node, const 
     std::optional<Texture> texture;
     if (word == "texture") {
         texture = readImage(*form, kind);
-    } else if (word == "checker") {
-        texture = readChecker(*form, row, kind);
-    } else {
+    } else if (word == "attribute") {
         texture = readAttribute(*form, what, kind);
+    } else {
+        texture = readPattern(*form, row, kind);
     }
     if (!texture) return std::nullopt;
     texture->place = place.resolved();
@@ -197,13 +207,7 @@ TextureIndex TextureReader::readNormalMap(const SectionReader& form) {
 
 bool TextureReader::readPart(const YamlNode& node, const std::string& what, const KeySchema& row,
                              TexelKind kind, TextureValue& value) {
-    const auto isForm = [&] {
-        if (node.kind != YamlKind::Map) return false;
-        for (const SectionSchema* variant : schemaVariants("texture"))
-            if (node.find(variantWord(*variant)) != nullptr) return true;
-        return kind == TexelKind::Numbers;
-    };
-    if (isForm()) {
+    if (isForm(node, kind == TexelKind::Numbers)) {
         const std::optional<TextureIndex> texture = readForm(node, node.place, what, row, kind);
         value.texture = texture.value_or(kNoTexture);
         return texture.has_value();
@@ -220,15 +224,21 @@ bool TextureReader::readPart(const YamlNode& node, const std::string& what, cons
     return spectrum.has_value();
 }
 
-std::optional<Texture> TextureReader::readChecker(const SectionReader& form, const KeySchema& row,
+std::optional<Texture> TextureReader::readPattern(const SectionReader& form, const KeySchema& row,
                                                   TexelKind kind) {
     Texture texture;
-    texture.kind = Texture::Kind::Checker;
+    const std::string pattern = variantWord(form.schema());
+    for (const auto& [type, word] : kPatternWords)
+        if (pattern == word) texture.kind = type;
     readTransform(form, texture);
-    const YamlNode* const list = form.list("checker");
+    for (const KeySchema& key : numbersOfPattern(form.schema())) {
+        texture.numbers.push_back(parseNumber(key.fallback).value.value_or(0));
+        form.read(key.name, texture.numbers.back());
+    }
+    const YamlNode* const list = form.list(pattern);
     if (list == nullptr) return std::nullopt;
     if (list->items.size() != 2) {
-        form.error("checker", fmt::format("a checker has two values, not {}", list->items.size()));
+        form.error(pattern, fmt::format("'{}' lists two values, not {}", pattern, list->items.size()));
         return std::nullopt;
     }
     bool good = true;

@@ -1,4 +1,4 @@
-/// Values of a scene that depend on the place: images, checkers, colours of vertices.
+/// Values of a scene that depend on the place: images, patterns, colours of vertices.
 #pragma once
 
 #include "scene/gltf/gltf_file.h"
@@ -46,7 +46,7 @@ private:
     static Texture opacityOfVertices(const SectionReader& form);
     std::shared_ptr<const TextureImage> openImage(const SectionReader& form, const TexelUse& use);
     void readFactor(const SectionReader& form, TexelUse& use) const;
-    std::optional<Texture> readChecker(const SectionReader& form, const KeySchema& row, TexelKind kind);
+    std::optional<Texture> readPattern(const SectionReader& form, const KeySchema& row, TexelKind kind);
     bool readPart(const YamlNode& node, const std::string& what, const KeySchema& row, TexelKind kind,
                   TextureValue& value);
     void readTransform(const SectionReader& form, Texture& texture);
