@@ -64,7 +64,8 @@ Option kernelOption(IntegratorOptions& integrator) {
     return {
         .names = "--kernel",
         .placeholder = "KIND",
-        .help = "lean: for this scene only; full: all features; lean-only: waits for the compiler; same bits",
+        .help = "lean: for this scene only; full: all features; lean-only: waits for the compiler; same "
+                "bits",
         .read = [&integrator](const std::string& text) { integrator.kernel = kernelNamed(text).value(); },
         .completion = completeWord(words),
         .choices = words};
