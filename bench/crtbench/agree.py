@@ -206,7 +206,7 @@ def measure(program, arguments):
          f"crt on `{backend}`, Mitsuba {mi.__version__} (`{arguments.variant}`). Images agree when two "
          f"one-sided "
          f"tests at 95 % put the ratio of the mean luminances within {MARGIN:.1%} of 1, and no tile of "
-         f"{TILES} × {TILES} differs by more. The programs' tables of the observer alone differ by 0.1 %.",
+         f"{TILES} × {TILES} differs by more. Different tables of the observer alone cause 0.1 %.",
          *notes],
         ["scene", "Mitsuba over crt, mean", "largest difference of a tile", "verdict"],
         [[*row[:3], row[4]] for row in rows],

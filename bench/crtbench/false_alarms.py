@@ -51,9 +51,10 @@ def measure(program, arguments):
         "How often `crt converge` is wrong where the truth is known",
         f"{repeats} repeats of each situation: progressive means of samples, pixel by pixel, of known "
         "variance, bias and cost, which go through the same analysis as renders. Samples are normal, or "
-        "rare bright paths (*fireflies*). *Stated*: the share that may be wrong. The last column names "
-        "situations that exceed it by more than three standard errors, and of how many statements: crt "
-        "makes no statement where the noise hides it.",
+        "rare bright paths (*fireflies*). *Stated* is the share of statements that may be wrong. The last "
+        "column lists the situations that exceed it by more than three standard errors, with the number of "
+        f'statements. crt often makes none: "100.00% of 1" means that one of the {repeats:,} repeats made a '
+        "statement, and it was wrong.",
         ["statement", "situations", "least wrong", "most wrong", "stated", "more often wrong than stated"],
         [
             by_statement([row for row in rows if row["statement"] == statement])
