@@ -137,7 +137,7 @@ LeftOut leftOut(const Scene& scene, const kernel::CrtScene& header, std::size_t 
     if (!has(CRT_FEATURE_SPECTRAL_FILM))
         left_out("spectral film", !isOfLight(scene) ? "integrator.type is a view"
                                                  : "the film has neither bins nor responses");
-    if (!has(CRT_FEATURE_VIEW)) left_out("normals and bounding-box views", "integrator.type is no view");
+    if (!has(CRT_FEATURE_VIEW)) left_out("normals and bounding-box views", "integrator.type is not a view");
     if (!has(CRT_FEATURE_SPLAT)) left_out("splats", "samples add to their own pixels alone");
     for (const auto& [feature, name] : {std::pair{CRT_FEATURE_SOBOL, "Sobol sampler"},
                                         std::pair{CRT_FEATURE_INDEPENDENT, "independent sampler"},

@@ -57,7 +57,7 @@ std::vector<TextureIndex> usedTextures(const Scene& scene, const std::vector<con
     for (const Material* material : materials)
         if (material)
             for (const TextureIndex index : material->textures()) use(index);
-    // From the last on: what a pattern is made of comes before it.
+    // From the last on: a pattern comes after the textures that it uses.
     std::vector<TextureIndex> all;
     for (std::size_t i = used.size(); i-- > 0;) {
         if (!used[i]) continue;

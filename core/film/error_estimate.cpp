@@ -218,7 +218,7 @@ bool missesBrightPaths(const Film& film, const PixelMap& variances, PixelSet whi
 LuminanceVariance::LuminanceVariance(const Film& film)
     : film_(film), from_replicates_(balanced(film)), squares_(firstChannel(film.shape().aovs, kAovSquares)) {
     if (!from_replicates_) {
-        // The splats of a pixel are those of all samples of the film: no square tells how they scatter.
+        // The splats of a pixel come from all samples of the film: its squares do not say how they vary.
         const bool tells = squares_ != 0 && film.splats.empty();
         dof_ = tells ? static_cast<double>(film.samples.count()) - 1 : 0;
         return;

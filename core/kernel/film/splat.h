@@ -1,5 +1,5 @@
 /*
- * splat.h: what a sample adds to other pixels than its own. Sums are integers of 128 bits in fixed point:
+ * splat.h: samples that add to other pixels than their own. Sums are integers of 128 bits in fixed point:
  * their addition has no order, so the bits are the same whichever thread, block or device comes first.
  *
  * The unit is 1 / splat_scale: 2^-32 of the scene's power, rounded to a power of two. A splat is rounded to
@@ -36,8 +36,8 @@ CRT_FN f32 crt_splat_share(const CrtContext *ctx) {
 }
 
 /* Adds to pixel (x, y) of the whole film, as a part of the sample that `film` takes at present. A pixel
-   outside the crop window is none of this film. The value of a pixel is the sum of its splats over the
-   number of samples a pixel. */
+   outside the crop window does not belong to this film. The value of a pixel is the sum of its splats over
+   the number of samples a pixel. */
 CRT_FN void crt_splat(const CrtContext *ctx, const CrtFilmPixel *film, u32 x, u32 y, vec4 xyz) {
     CRT_GLOBAL const CrtScene *scene = ctx->scene;
     const u32 column = x - scene->crop_x, row = y - scene->crop_y; /* huge where x or y is less */
