@@ -797,6 +797,10 @@ TEST_CASE("threads and tiles do not show", "[bits]") {
 
 TEST_CASE("what a backend brings shows in no bit", "[bits]") {
     const crt::CompileOptions brings = crt::compileOptionsFor(backend());
+    if (brings.accelerator_reach == 0) {  // Nothing: both films would be of the same compiled scene.
+        for (const Named& n : allScenes()) CHECK_FALSE(crt::compileScene(n.scene, 0, brings).without_nodes);
+        return;
+    }
     const auto filmOf = [](const crt::Scene& scene, const crt::CompileOptions& options) {
         const crt::CompiledScene compiled = crt::compileScene(scene, kAllAovs, options);
         CHECK_FALSE((compiled.without_nodes && (compiled.nodes > 0 || options.accelerator_reach == 0)));
@@ -815,8 +819,7 @@ TEST_CASE("what a backend brings shows in no bit", "[bits]") {
         any = any || crt::compileScene(scene, 0, brings).without_nodes;
         CHECK(differingPixels(filmOf(scene, {}), filmOf(scene, brings)) == 0);
     }
-    // Otherwise nothing was compared with anything.
-    CHECK(any == (brings.accelerator_reach > 0));
+    CHECK(any);  // Otherwise nothing was compared with anything.
 
     // A camera from beyond the reach of what it brings.
     crt::Scene far = sceneOf(kCases[0]);

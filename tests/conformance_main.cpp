@@ -1,5 +1,5 @@
-// crt_conformance --backend NAME [--against NAME] [--lean-kernels] [Catch2 options]: the border and the bits
-// of every backend.
+// crt_conformance --backend NAME [--against NAME] [--lean-kernels] [--no-cache] [Catch2 options]: the border
+// and the bits of every backend.
 // crt_conformance verify OPTIONS: scenes whose answer is known, for `crt verify` (verify/program.h).
 //
 // Exit code 77 and one sentence when the backend cannot run here, so that a machine without a GPU skips
@@ -24,6 +24,7 @@ namespace {
 std::string backend_name = "embree";
 std::string reference_name;
 bool lean_kernels = false;
+bool no_cache = false;
 constexpr int kSkipped = 77;
 
 /// The backend of that name, where it is another than the one under test and runs here.
@@ -70,7 +71,9 @@ bool leanKernels() { return lean_kernels; }
 
 crt::Film render(const crt::LoadedBackend& with, const crt::Scene& scene, const Run& run,
                  CrtBackendReport* report) {
-    crt::Session session(with, run.options);
+    crt::IntegratorOptions options = run.options;
+    options.use_cache = options.use_cache && !no_cache;
+    crt::Session session(with, options);
     crt::Film film = crt::renderFilm(
         session, scene, {.samples = run.samples, .first_sample = run.first_sample, .aovs = run.aovs});
     if (report != nullptr) *report = session.report();
@@ -123,6 +126,7 @@ int main(int argc, char** argv) {
         argc, argv,
         {{"--backend", "backend under test, or a path to its .so", &conformance::backend_name},
          {"--against", "backend to compare bits with", &conformance::reference_name},
-         {"--lean-kernels", "the backend must have lean kernels", nullptr, &conformance::lean_kernels}},
+         {"--lean-kernels", "the backend must have lean kernels", nullptr, &conformance::lean_kernels},
+         {"--no-cache", "do not keep compiled kernels on disk", nullptr, &conformance::no_cache}},
         probe);
 }

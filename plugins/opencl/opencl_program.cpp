@@ -115,7 +115,11 @@ Built buildKernel(const plugin::Host& host, const Device& device, const Session&
         built.program = fromText(session, device, text, options);
         // PoCL generates the machine code only at the first launch, 0.7 s that none of crt's times include,
         // and keeps it in a separate cache.
-        const std::vector<unsigned char> compiled = programBinary(built.program.get());
+        // Reading the program back makes PoCL generate it for launches of any size, too: a quarter of the
+        // whole, only worth it for a kernel that is kept.
+        const bool kept = !cache.path(key).empty();
+        const std::vector<unsigned char> compiled =
+            kept ? programBinary(built.program.get()) : std::vector<unsigned char>{};
         built.compile_seconds = compile_time.seconds();
 
         const gpu::Stopwatch store_time;
