@@ -2,13 +2,15 @@
 // and checks that none spills more than a few registers. Needs no GPU. Prints registers and compile time of
 // each variant.
 //
-//     nvrtc_variants [--arch 90] [--part I N] [--precompiled LOG] [--only] [SCENE.yaml …]
+//     nvrtc_variants [--arch 90] [--part I N] [--precompiled LOG] [--fewest-blocks] [--only] [SCENE …]
 //
 // The masks: everything, each sampler and accelerator, each kind of material, and those of the scenes given,
 // as a render of the file compiles them. --only: those of the scenes that follow, alone. --part: every
 // N-th variant, from the I-th on. --precompiled: the kernel with everything in is judged by what nvcc has
-// written into LOG while the build compiled it, and is not compiled again.
-// Exit code 77, which ctest shows as skipped, where NVRTC is missing.
+// written into LOG while the build compiled it, and is not compiled again. --fewest-blocks: each variant is
+// compiled once, with the most registers that a render allows it, instead of as a render does. It fails
+// where a render's fails, because a render takes more blocks only where those spill little. Exit code 77,
+// which ctest shows as skipped, where NVRTC is missing.
 #include "cuda_nvrtc.h"
 #include "cuda_program.h"
 
@@ -119,6 +121,7 @@ void addScene(const crt::CompiledScene& scene, const std::string& name, Variants
 
 int run(int argc, char** argv) {
     int arch = 90, part = 1, parts = 1;
+    bool fewest_blocks = false;
     std::string precompiled;
     Variants variants;
     for (const auto& [mask, name] : representativeMasks()) addMask(mask, name, variants);
@@ -135,6 +138,10 @@ int run(int argc, char** argv) {
         if (std::strcmp(argv[i], "--precompiled") == 0 && i + 1 < argc) {
             precompiled = crt::slurp(argv[++i]);
             if (precompiled.empty()) throw std::runtime_error(std::string(argv[i]) + " is missing or empty");
+            continue;
+        }
+        if (std::strcmp(argv[i], "--fewest-blocks") == 0) {
+            fewest_blocks = true;
             continue;
         }
         if (std::strcmp(argv[i], "--only") == 0) {
@@ -172,13 +179,17 @@ int run(int argc, char** argv) {
         const KernelSpec spec{static_cast<Entry>(key.first), key.second};
         const std::string entry = crt::gpu::entryName(spec.entry);
         const auto start = std::chrono::steady_clock::now();
-        // The one with everything in is compiled ahead of time, for three blocks (its CMakeLists.txt).
-        const bool full = spec.features == CRT_FEATURES_ALL;
-        const crt::cuda::Cubin cubin =
-            !full ? crt::cuda::compileLean(nvrtc, text, arch, spec)
-            : precompiled.empty()
-                ? nvrtc.compile(text, "kernel/schedule/wavefront.h", crt::cuda::nvrtcOptions(arch, spec, 3))
-                : crt::cuda::Cubin{{}, precompiled};
+        const auto compiled = [&] {
+            // The kernel with everything in is compiled ahead of time, for three blocks (its
+            // CMakeLists.txt).
+            const bool full = spec.features == CRT_FEATURES_ALL;
+            if (full && !precompiled.empty()) return crt::cuda::Cubin{{}, precompiled};
+            if (!full && !fewest_blocks) return crt::cuda::compileLean(nvrtc, text, arch, spec);
+            const int blocks = crt::cuda::blocksPerMultiprocessor(spec).back();
+            return nvrtc.compile(text, "kernel/schedule/wavefront.h",
+                                 crt::cuda::nvrtcOptions(arch, spec, blocks));
+        };
+        const crt::cuda::Cubin cubin = compiled();
         const double ms =
             std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
         const crt::cuda::ResourceUse use = crt::cuda::resourceUse(cubin.log, entry);
