@@ -1,5 +1,6 @@
 #include "compile/coat.h"
 
+#include "base/for_avx2.h"
 #include "base/memo.h"
 #include "base/parallel.h"
 #include "compile/reflectance.h"
@@ -46,7 +47,7 @@ CoatKey coatKeyOf(const Clearcoat& coat) { return {coat.ior, coat.roughness}; }
 
 }  // namespace
 
-double coatAlbedo(double cosine, double eta, double alpha) {
+CRT_FOR_AVX2_TOO double coatAlbedo(double cosine, double eta, double alpha) {
     return meanOverVisibleNormals<32, 128>(
         atCosine(cosine), {alpha, alpha}, [&](double cos_m, const Vec3d& m) {
             return dielectricReflectance(cos_m, eta) * unshadowed(cosine, 2 * cos_m * m[2] - cosine, alpha);

@@ -1,5 +1,6 @@
 #include "compile/loss_table.h"
 
+#include "base/for_avx2.h"
 #include "base/memo.h"
 #include "base/parallel.h"
 #include "compile/reflectance.h"
@@ -91,8 +92,8 @@ public:
     }
     double operator()(double cosine) const {
         const double x = std::min(cosine, 1.0) * kCells;
-        const auto i = static_cast<std::size_t>(x);
-        return values_[i] + (x - static_cast<double>(i)) * (values_[i + 1] - values_[i]);
+        const int i = static_cast<int>(x);  // Vectors convert int, and not size_t.
+        return values_[i] + (x - i) * (values_[i + 1] - values_[i]);
     }
 
 private:
@@ -104,25 +105,25 @@ private:
 /// direction, turned to this side of the surface, that nothing is in the way of. `kFineness`: of the rule.
 template <std::size_t kFineness, class F, class G>
 double microfacetLoss(const Vec3d& w, double eta, const Widths& alpha, const F& reflectance, const G& open) {
-    const auto lost = [&](double cos_m, const Vec3d& m) {
-        const double mirrored = 1 - open(m * (2 * cos_m) - w);
-        if (eta == 0) return mirrored;
+    const auto above = [&](double cos_m, const Vec3d& m) { return 1 - open(m * (2 * cos_m) - w); };
+    if (eta == 0) return meanOverVisibleNormals<32, kFineness>(w, alpha, above);
+    const auto both = [&](double cos_m, const Vec3d& m) {
         const double refraction = (eta - 1) * (eta + 1) + cos_m * cos_m;
-        if (!(refraction > 0)) return mirrored;
-        const double reflected = reflectance(cos_m);
+        const double reflected = reflectance(cos_m), lost_above = above(cos_m, m);
         const Vec3d bent = w - m * (cos_m - std::sqrt(refraction));
-        return reflected * mirrored +
-               (1 - reflected) * (1 - open({bent[0] / eta, bent[1] / eta, bent[2] / eta}));
+        const double lost = reflected * lost_above +
+                            (1 - reflected) * (1 - open({bent[0] / eta, bent[1] / eta, bent[2] / eta}));
+        return refraction > 0 ? lost : lost_above;
     };
-    return eta > 0 && eta < 1 ? meanOverVisibleNormals<kFineness, kFineness>(w, alpha, lost)
-                              : meanOverVisibleNormals<32, kFineness>(w, alpha, lost);
+    return eta < 1 ? meanOverVisibleNormals<kFineness, kFineness>(w, alpha, both)
+                   : meanOverVisibleNormals<32, kFineness>(w, alpha, both);
 }
 
 /// The function that computes one row.
 struct Row {
     double index, alpha;
     std::shared_ptr<const FilmReflectance> film;  ///< Null: the interface has none.
-    double narrowing = 0, azimuth = 0;  ///< As of crt_azimuth.
+    double narrowing = 0, azimuth = 0;            ///< As of crt_azimuth.
 
     /// work(reflectance by the cosine)
     template <class Work>
@@ -131,7 +132,7 @@ struct Row {
         return work([eta = index](double c) { return dielectricReflectance(c, eta); });
     }
 
-    double loss(double cosine) const {
+    CRT_FOR_AVX2_TOO double loss(double cosine) const {
         return withReflectance([&](const auto& reflectance) {
             if (narrowing == 0)
                 return microfacetLoss<128>(atCosine(cosine), index, {alpha, alpha}, reflectance,

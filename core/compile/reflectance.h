@@ -11,11 +11,11 @@ namespace crt {
 /// Unpolarised reflectance of an interface of relative index `eta`; 1 in total internal reflection.
 inline double dielectricReflectance(double cosine, double eta) {
     const double refraction = (eta - 1) * (eta + 1) + cosine * cosine;  // (η cos of refraction)²
-    if (!(refraction > 0)) return 1;
     const double cos_t = std::sqrt(refraction) / eta;
     const double rs = (cosine - eta * cos_t) / (cosine + eta * cos_t);
     const double rp = (eta * cosine - cos_t) / (eta * cosine + cos_t);
-    return (rs * rs + rp * rp) / 2;
+    const double reflectance = (rs * rs + rp * rp) / 2;
+    return refraction > 0 ? reflectance : 1;  // Not before: compilers vectorize what has no branches.
 }
 
 /// Of a conductor of index n + ik.

@@ -21,7 +21,7 @@ public:
     double seconds() const { return steps_ * kSecondsPerStep; }
 
 private:
-    /// Measured on one core of a server of 2020.
+    /// Measured on one core of a server of 2020, without vectors: with AVX2 it is a third.
     static constexpr double kSecondsPerStep = 1.5e-8;
 
     double steps_ = 0;
