@@ -76,8 +76,8 @@ void countIntervals(Tallies& tallies, const ConfigurationFit& fit, const Synthet
     tallies.interval("relative RMSE", last.relative_rmse, std::sqrt(mse));
     if (fit.fitted && std::isfinite(fit.error.variance.value) && what.rate == 1 &&
         (b2 == 0 || what.has_reference))
-        tallies.interval("v of v/N + b²", fit.error.variance, v);
-    if (fit.error.bias_squared) tallies.interval("b²", *fit.error.bias_squared, b2);
+        tallies.interval("variance of a sample", fit.error.variance, v);
+    if (fit.error.bias_squared) tallies.interval("squared bias", *fit.error.bias_squared, b2);
     if (last.mean_bias) tallies.interval("bias of the image mean", *last.mean_bias, what.mean_bias);
     if (fit.fitted && b2 == 0 && what.rate == 1 && std::isfinite(fit.slope_samples.value))
         tallies.interval("slope", fit.slope_samples, -0.5);
@@ -95,14 +95,14 @@ void countIntervals(Tallies& tallies, const ConfigurationFit& fit, const Synthet
         tallies.interval("predicted over actual error", *last.calibration, predicted / std::sqrt(mse));
 }
 
-/// Verdicts that are wrong, whatever the situation: FAIL of what is right, PASS of what is not.
+/// Verdicts that are wrong, whatever the situation: FAIL of a correct backend, PASS of a biased one.
 void countVerdict(Tallies& tallies, const ConfigurationFit& fit, bool right, bool flat) {
     using stats::Verdict;
     if (right) {
-        tallies.count("FAIL of what is right", 0.001, fit.judgement.verdict == Verdict::Fail);
-        if (fit.fitted && !flat) tallies.count("a floor where there is none", 0.001, fit.error.flattening);
+        tallies.count("FAIL of a correct backend", 0.001, fit.judgement.verdict == Verdict::Fail);
+        if (fit.fitted && !flat) tallies.count("a bias floor without a bias", 0.001, fit.error.flattening);
     } else {
-        tallies.count("PASS of what is wrong", 0.001, fit.judgement.verdict == Verdict::Pass);
+        tallies.count("PASS of a biased backend", 0.001, fit.judgement.verdict == Verdict::Pass);
     }
 }
 
@@ -228,25 +228,25 @@ void measureFaults(int repeats) {
         const auto seed = static_cast<std::uint64_t>(7919 * i + 13);
         Run run = syntheticRun(what, seed);
         run.rows[static_cast<std::size_t>(i) % run.rows.size()].invalid_samples = 1;
-        tallies.count("no FAIL of a void row", 0,
+        tallies.count("a void row without FAIL", 0,
                       analyze(run).fits[0].judgement.verdict != stats::Verdict::Fail);
         for (Row& row : run.rows) row.invalid_samples = 1;
-        tallies.count("no FAIL where all rows are void", 0,
+        tallies.count("void rows alone without FAIL", 0,
                       analyze(run).fits[0].judgement.verdict != stats::Verdict::Fail);
         what.mean_bias = -0.05;
-        tallies.count("no FAIL of a bias of −5 %", 0,
+        tallies.count("a bias of −5 % without FAIL", 0,
                       analyze(syntheticRun(what, seed)).fits[0].judgement.verdict != stats::Verdict::Fail);
         what.mean_bias = 0;
         what.colour = {1.3, 0.9, -0.2};
         what.colour_bias = {0, 0, -0.05};
-        tallies.count("no FAIL of one of −5 % in a channel below 0", 0,
+        tallies.count("a bias of −5 % in a channel below 0 without FAIL", 0,
                       analyze(syntheticRun(what, seed)).fits[0].judgement.verdict != stats::Verdict::Fail);
         what.colour_bias = {0, 0, 0};
         what.bias = 0.05;
-        tallies.count("no FAIL of pixels off by 5 %", 0,
+        tallies.count("pixels off by 5 % without FAIL", 0,
                       analyze(syntheticRun(what, seed)).fits[0].judgement.verdict != stats::Verdict::Fail);
     }
-    tallies.print("what must fail");
+    tallies.print("faults that must FAIL");
 }
 
 }  // namespace

@@ -334,9 +334,11 @@ std::vector<Case> accumulationCases() {
         kDirectLight | CRT_FEATURE_SOBOL | CRT_FEATURE_INDEPENDENT | CRT_FEATURE_XORSHIFT;
     return {
         row("I01", "constant-pixel",
-            "2^10 and 2^20 samples of a constant (2^24 and 2^25 at merge, 2^27 at night)", "the constant",
+            "2^10 and 2^20 samples of a constant (2^24 and 2^25 at level merge, 2^27 at level nightly)",
+            "the constant",
             "a float sum stands still at 2^24", "1e-6", Level::Commit, CRT_FEATURE_VIEW, constantPixel),
-        row("I02", "noisy-pixel", "2^20 independent samples of A03 (2^24 at merge, 2^27 at night)",
+        row("I02", "noisy-pixel",
+            "2^20 independent samples of A03 (2^24 at level merge, 2^27 at level nightly)",
             "0.2394564705", "rectangle formula", "4σ/√n + 1e-6", Level::Commit,
             kDirectLight | CRT_FEATURE_INDEPENDENT, noisyPixel),
         row("I03", "high-indices", "Samples around number 2^31, 2^32, 2^40 and 2^52",

@@ -172,8 +172,8 @@ std::vector<Case> anisotropyCases() {
     constexpr std::uint64_t metal = CRT_FEATURE_ANISOTROPY | CRT_FEATURE_ROUGH_CONDUCTOR;
     return {
         row("G30", "anisotropic-furnace",
-            "Brushed metal at 0°, 60° and 85° and three azimuths in a constant environment; before a "
-            "merge a cube of brushed glass",
+            "Brushed metal at 0°, 60° and 85° and three azimuths in a constant environment; from "
+            "level merge on a cube of brushed glass",
             "1 for perfect metal and for glass; else quadrature over the normals, what is lost given back",
             "conservation of energy; Heitz (2014); Kulla and Conty (2017)", "± 0.2 %, ± 0.3 %",
             Level::Commit, CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_ROUGH_DIELECTRIC | metal, furnace),

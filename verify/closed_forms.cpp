@@ -277,7 +277,7 @@ void parallelMirrors(Context& context) {
 struct CubeProbe {
     const char* where;
     const char* camera;
-    std::array<int, 4> commit_depths;  ///< Tested on every commit; the others from merge on.
+    std::array<int, 4> commit_depths;  ///< Tested on every commit; the others from level merge on.
     double at_depth_1, at_depth_2, at_depth_3, at_depth_5, at_depth_10, at_infinity;
 };
 constexpr CubeProbe kCubeProbes[] = {
@@ -553,7 +553,8 @@ std::vector<Case> closedFormCases() {
         {.id = "A04",
          .name = "triangle-lights",
          .title =
-             "Random triangles of light over a floor point, some cut by the horizon (8; 100 from merge on)",
+             "Random triangles of light over a floor point, some cut by the horizon (8; 100 from level "
+             "merge on)",
          .expected = "Lambert's polygon formula for each",
          .source = "Lambert, Photometria, 1760",
          .tolerance = "± 0.3 % for every one",
@@ -566,8 +567,8 @@ std::vector<Case> closedFormCases() {
          .expected = "the form factor of the lamp's image; for a mirror "
                      "at 2 0.001141273786, with the lamp 0.2405977442",
          .source = "images, rectangle formula",
-         .tolerance = "± 1 % (mirror at 0.75), ± 0.3 % from merge on; mirror at 2 with the lamp ± 0.3 %, "
-                      "alone ± 2 % at merge, ± 0.3 % at night",
+         .tolerance = "± 1 % (mirror at 0.75), ± 0.3 % from level merge on; mirror at 2 with the lamp "
+                      "± 0.3 %, alone ± 2 % at level merge, ± 0.3 % at level nightly",
          .level = Level::Commit,
          .needs = CRT_FEATURE_DIFFUSE | CRT_FEATURE_AREA_LIGHT | CRT_FEATURE_NEE | CRT_FEATURE_CONDUCTOR,
          .run = mirrorWall},
@@ -583,7 +584,7 @@ std::vector<Case> closedFormCases() {
         {.id = "A07",
          .name = "unit-cube",
          .title = "Unit cube of reflectance ½ under a glowing ceiling: four probes, depths 1 to 64 (nine "
-                  "of the 24 before merge)",
+                  "of the 24 at level commit)",
          .expected = "radiosity at each depth, e.g. 0.1544164 at the floor's centre after 2 events, "
                      "0.197603 in the end",
          .source = "Nyström solution of the radiosity equation, six discretisations agreeing to 1e-6",

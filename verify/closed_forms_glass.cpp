@@ -399,7 +399,7 @@ std::vector<Case> glassCases() {
         {.id = "A11",
          .name = "reflectance",
          .title = "Reflectance of an interface: 0°, Brewster's angle, 60°, 89.9°, the critical angle, "
-                  "diffuse light (from merge on); n = 1.5, 2.4, 100",
+                  "diffuse light (from level merge on); n = 1.5, 2.4, 100",
          .expected = "0.04, 0.073964497, 0.089186713, 0.98991188, exactly "
                      "1 beyond 41.810315°; 0.16955017, 0.96078816",
          .source = "Fresnel's equations; diffuse averages by quadrature",
@@ -439,7 +439,7 @@ std::vector<Case> glassCases() {
         {.id = "A15",
          .name = "prism",
          .title = "60° prism of N-BK7 at the d line's least deviation: where the lines d, F, C, 400 and "
-                  "700 nm go (d alone before merge)",
+                  "700 nm go (d alone at level commit)",
          .expected = "deviations of 38.6466985°, 39.1390498°, 38.4293164°, 39.8956926°, 38.3192326°",
          .source = "Snell's law and Schott's Sellmeier coefficients to 30 digits, the lines at 587.5618, "
                    "486.1327 and 656.2725 nm",

@@ -413,7 +413,7 @@ std::vector<Case> lightCases() {
             "the form factor, in the limit 1", "rectangle formula", "± 0.5 %", Level::Commit, kDirectLight,
             nearLight),
         row("E07", "tiled-light",
-            "The lamp of A03 as 2, 8 and 1058 triangles; 105800 at merge, 1002528 at night",
+            "The lamp of A03 as 2, 8 and 1058 triangles; 105800 at level merge, 1002528 at level nightly",
             "0.2394564705 always", "rectangle formula", "± 0.1 %", Level::Commit,
             kDirectLight | CRT_FEATURE_BVH, tiledLight),
         row("E08", "many-lights",

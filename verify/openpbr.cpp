@@ -404,7 +404,8 @@ std::vector<Case> openPbrCases() {
             roughDiffuse),
         row("G38", "fuzz",
             "Fuzz on black and white floors under beams from three directions; on what is diffuse, glossy, "
-            "metal and before a merge clear, at three angles in light from everywhere; on a mirror, by "
+            "metal and, from level merge on, clear, at three angles in light from everywhere; on a mirror, "
+            "by "
             "light sampling, scattered rays and both; on a clear body, and seen from within it",
             "the linearly transformed cosine and its albedo; what is below times 1 less that; 1; "
             "nothing from within",

@@ -171,7 +171,8 @@ std::vector<Case> openPbrCoatCases() {
         "G39", "openpbr-coat",
         "Coats, smooth and rough, clear and tinted, on diffuse floors under beams from three directions; "
         "on white of five kinds, on metals, glosses and in part in light from everywhere, from 60° and "
-        "before a merge from two further angles; on metal, by light sampling, scattered rays and both; "
+        "from level merge on also from two further angles; on metal, by light sampling, scattered rays and "
+        "both; "
         "none",
         "the specification's formulas of what is mirrored, passed and darkened, by quadrature over normals "
         "and directions; 1 for white; the bare surface's bits",

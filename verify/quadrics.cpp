@@ -387,7 +387,8 @@ std::vector<Case> quadricCases() {
             quadricRays),
         row("G40", "lenses",
             "A sun seen through a ball and through two caps with a rim, of index 1.5, from two distances; "
-            "through a ball of SF10, in six bins of wavelengths; before a merge also of index 1.8, and the "
+            "through a ball of SF10, in six bins of wavelengths; from level merge on also of index 1.8, and "
+            "the "
             "caps of SF10",
             "the disk that it fills: f = nR / (2 (n − 1)) and the lensmaker's equation, with what is lost "
             "by "

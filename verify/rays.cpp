@@ -299,7 +299,7 @@ std::vector<Case> rayCases() {
             "finite", Level::Commit, 0, farVertex),
         row("D08", "occlusion-and-closest", "Light sampling and chance hits in a thicket",
             "the same radiance", "both estimate the same integral",
-            "± 4 %; ± 2 % before merges, ± 0.5 % at night", Level::Commit,
+            "± 4 %; ± 2 % at level merge, ± 0.5 % at level nightly", Level::Commit,
             CRT_FEATURE_BVH | CRT_FEATURE_NEE | CRT_FEATURE_AREA_LIGHT, occlusionAndClosest),
         row("D09", "brute-force-and-tree",
             "First hits with and without a tree, from inside, outside and far away", "the same",

@@ -614,7 +614,8 @@ std::vector<Case> scaleCases() {
          .run = denormalCoordinates},
         {.id = "B11",
          .name = "huge-floors",
-         .title = "A lamp at height 1 over quads and disks of half size 1e3 and 1e5 (1e4 and 1e6 from merge "
+         .title = "A lamp at height 1 over quads and disks of half size 1e3 and 1e5 (1e4 and 1e6 from level "
+                  "merge "
                   "on), off their middle",
          .expected = "the light of a floor of 10, with the same random numbers",
          .source = "a floor's size does not change the light that a point of it gets",

@@ -253,9 +253,9 @@ Case furnaceCase(const char* id, const char* name, double albedo, int depth, con
 std::vector<Case> stiffCases() {
     return {
         furnaceCase("F01", "albedo-0.9", 0.9, 65, "", albedo9),
-        furnaceCase("F02", "albedo-0.99", 0.99, 687, "from merge on", albedo99),
-        furnaceCase("F03", "albedo-0.999", 0.999, 6904, "from merge on", albedo999),
-        furnaceCase("F04", "albedo-0.9999", 0.9999, 69074, "at night", albedo9999),
+        furnaceCase("F02", "albedo-0.99", 0.99, 687, "from level merge on", albedo99),
+        furnaceCase("F03", "albedo-0.999", 0.999, 6904, "from level merge on", albedo999),
+        furnaceCase("F04", "albedo-0.9999", 0.9999, 69074, "at level nightly", albedo9999),
         {.id = "F05",
          .name = "depths",
          .title = "Depths 0, 1, 2, 10000 and 10⁹",
@@ -295,7 +295,8 @@ std::vector<Case> stiffCases() {
         {.id = "F09",
          .name = "slit",
          .title =
-             "Light through a slit of width 0.1 (0.01 from merge on, 0.001 at night) that only chance finds",
+             "Light through a slit of width 0.1 (0.01 from level merge on, 0.001 at level nightly) that "
+             "only chance finds",
          .expected = "its form factor p, and a variance of p·E[w²] − p² a path",
          .source = "Lambert's formula; Bernoulli's variance",
          .tolerance = "± 2 %; variance 10 %",

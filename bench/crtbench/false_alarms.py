@@ -26,13 +26,11 @@ def measure(program, arguments):
         "end) unless it says otherwise. *Stated*: the part that may be wrong. A part above what is stated "
         "by "
         "more than "
-        "three standard errors of the counting is **bold**. Intervals of *b²* are wide by intent: around 0 "
-        "the "
-        "jackknife is too careful, and what it misses is covered by Fisher's F. *FAIL of what is right*, *a "
-        "floor where "
-        "there is none* and *PASS of what is wrong* are claimed at 99.9 %. Intervals that have no bounds, "
-        "because an "
-        "error hides in the reference's noise, are not asked."
+        "three standard errors of the counting is **bold**. Intervals of the *squared bias* are wide by "
+        "intent: around 0 the jackknife is too careful, and Fisher's F covers what it misses. *FAIL of a "
+        "correct backend*, *a bias floor without a bias* and *PASS of a biased backend* are claimed at "
+        "99.9 %. Intervals that have no bounds, because an error hides in the reference's noise, are not "
+        "asked."
     )
     for situation in dict.fromkeys(row["situation"] for row in rows):
         results.heading(situation[0].upper() + situation[1:])

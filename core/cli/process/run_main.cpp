@@ -29,7 +29,7 @@ int runMain(const std::function<int()>& body) {
         const std::string text = error.what();
         // Errors in a scene already contain their places, which editors find only at the start of a line.
         const bool has_places = text.find(": error: ") != std::string::npos;
-        logMessage(LogLevel::Error, (has_places ? "the scene cannot be rendered as it is:\n" : "") + text);
+        logMessage(LogLevel::Error, (has_places ? "crt cannot use the scene:\n" : "") + text);
         return error.exitCode();
     } catch (const std::bad_alloc&) {
         logMessage(LogLevel::Error, "out of memory on the host");
