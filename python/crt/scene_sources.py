@@ -1,6 +1,8 @@
 """Sources of scenes: files, text, and dicts with NumPy arrays in them."""
 
 import contextlib
+import fcntl
+import functools
 import json
 import os
 import pathlib
@@ -44,7 +46,7 @@ class Text:
 
     def __init__(self, source, directory, name):
         self.source, self.directory, self.name = source, os.fspath(directory), name
-        self.folder = Folder()
+        self.folder = None if isinstance(source, str) else Folder()
         self.arrays = None  # Of the text that was made last.
 
     def text(self):
@@ -80,10 +82,87 @@ def say_nothing(_level, _text):
     """Messages about a scene appear when it is read for a render."""
 
 
+NAME, LOCK = "crt-arrays-", "lock"
+
+
 class Folder:
     """A temporary folder, which goes with this object or with the interpreter. Textures are read from it
     when the scene is rendered."""
 
     def __init__(self):
-        self.path = pathlib.Path(tempfile.mkdtemp(prefix="crt-arrays-"))
-        weakref.finalize(self, shutil.rmtree, self.path, ignore_errors=True)
+        place = tempfile.gettempdir(), os.getpid()
+        self.shared = _shared.get(place) or _shared.setdefault(place, SharedFolder(place[0]))
+        self.path = pathlib.Path(tempfile.mkdtemp(dir=self.shared.path))
+        weakref.finalize(self, remove, self.path, os.getpid())
+
+
+class SharedFolder:
+    """The folder of all folders of a process, which goes with the last of them. A file in it is locked
+    meanwhile: the kernel unlocks it when the process ends in any way, and the next process that makes such
+    a folder removes this one. One file for all of them, because a process can open few files."""
+
+    def __init__(self, parent):
+        remove_abandoned(parent)
+        # Locked before it has the name by which other processes find it.
+        hidden = tempfile.mkdtemp(prefix=f".{NAME}", dir=parent)
+        lock = locked(os.path.join(hidden, LOCK))
+        self.path = pathlib.Path(parent, os.path.basename(hidden)[1:])
+        os.rename(hidden, self.path)
+        weakref.finalize(self, remove, self.path, os.getpid(), lock)
+
+
+_shared = weakref.WeakValueDictionary()  # By the folder that it is in, and the process.
+
+
+def locked(path):
+    """The descriptor of a new file that is locked. None, and no file, where the file system has no locks:
+    without the file, no other process removes the folder."""
+    descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o600)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        os.close(descriptor)
+        os.unlink(path)
+        return None
+    return descriptor
+
+
+def remove(path, owner, lock=None):
+    """Removes a folder of this process. A process that was forked from its owner leaves it alone."""
+    if os.getpid() == owner:
+        shutil.rmtree(path, ignore_errors=True)
+    if lock is not None:
+        os.close(lock)
+
+
+@functools.cache  # Once in each process: the folder of everyone may hold many files.
+def remove_abandoned(parent):
+    """Removes folders of arrays whose process was killed."""
+    names = ()
+    with contextlib.suppress(OSError):  # A folder that can be written to may not be readable.
+        names = [name for name in os.listdir(parent) if name.startswith(NAME)]
+    for name in names:
+        path = os.path.join(parent, name)
+        with contextlib.suppress(OSError):  # Another process may remove it at the same time.
+            if is_abandoned(path):
+                shutil.rmtree(path)
+
+
+def is_abandoned(path):
+    """True if the folder belongs to this user, is no link, and has a lock file that no process locks: on
+    this machine or, where the file system shares locks, on another. Process numbers would not tell: they
+    are used again, and differ in containers. Raises OSError where there is no such file."""
+    folder = os.open(path, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+    try:
+        if os.fstat(folder).st_uid != os.geteuid():
+            return False
+        descriptor = os.open(LOCK, os.O_RDWR | os.O_NOFOLLOW | os.O_NONBLOCK, dir_fd=folder)
+    finally:
+        os.close(folder)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        return True
+    except BlockingIOError:
+        return False
+    finally:
+        os.close(descriptor)

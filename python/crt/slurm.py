@@ -10,6 +10,7 @@ import subprocess
 
 from . import program
 from .errors import Error, Kind
+from .rendering import plugins
 from .sample_ranges import Missing
 from .scenes import load
 from .slurm_scripts import merge_script, render_script, submit_script
@@ -107,7 +108,10 @@ def written(options):
             "changes": changes}
     folder = pathlib.Path(absolute(options.folder or f"{stem}.slurm"))
     require_same(folder, spec)
-    render = [*words({"-b": options.backend, "-d": options.device, "-t": options.threads}), *changes]
+    backend = backend_on_nodes(options.backend)
+    render = [*words({"-b": backend, "-d": options.device, "-t": options.threads}), *changes]
+    require_readable([*render, "--samples", ":".join(map(str, spec["ranges"][-1])),
+                      "--checkpoint-every", options.checkpoint_every])
     crt = str(program.path().resolve())
     name = "crt-" + re.sub(r"[^A-Za-z0-9_.-]", "_", stem)
     shared = words({"--partition": options.partition})
@@ -126,6 +130,30 @@ def written(options):
     except OSError as error:
         raise Error(f"cannot write the scripts: {error}", Kind.OUTPUT) from None
     return folder
+
+
+NO_SCENE = "/dev/null/scene.yaml"  # Nothing can be below a file that is no folder.
+
+
+def require_readable(arguments):
+    """Raises crt.Error where `crt render` refuses one of its arguments, which would end every part. The
+    program reads its arguments before it opens a scene, and here it finds none."""
+    program.run(["render", NO_SCENE, *arguments], answers=(int(Kind.SCENE),))
+
+
+def backend_on_nodes(backend):
+    """The backend as a script names it, whose working directory may differ. Raises crt.Error where crt does
+    not have it. This machine may lack the device."""
+    if backend is None or backend == "auto":
+        return backend
+    if "/" in backend:
+        if not os.path.isfile(backend):
+            raise Error(f"there is no backend file '{backend}'", Kind.USAGE)
+        return absolute(backend)
+    known = [plugin.name for plugin in plugins()]
+    if backend not in known:
+        raise Error(f"backend '{backend}' is unknown; backends are auto, {', '.join(known)}", Kind.BACKEND)
+    return backend
 
 
 def absolute(path):

@@ -2,10 +2,12 @@
 
 import contextlib
 import logging
+import time
 
 import numpy as np
 
 import crt
+from crt import pictures
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
@@ -25,6 +27,15 @@ def quiet():
     logging.getLogger("crt").setLevel(logging.ERROR)
     yield
     logging.getLogger("crt").setLevel(before)
+
+
+@contextlib.contextmanager
+def at_most(processor_seconds):
+    """Fails where this process computes for longer, on all its threads together."""
+    before = time.process_time()
+    yield
+    took = time.process_time() - before
+    assert took < processor_seconds, f"{took:.1f} s of a processor, not {processor_seconds}"
 
 
 def rendered(scene, spp=16):
@@ -51,6 +62,12 @@ def pfm(pixels):
     """The bytes of a PFM: top row first in `pixels` (height, width, 3)."""
     pixels = np.asarray(pixels, "<f4")
     return f"PF\n{pixels.shape[1]} {pixels.shape[0]}\n-1.0\n".encode() + pixels[::-1].tobytes()
+
+
+def write_png(path, pixels):
+    """`pixels` (height, width, 3): the bytes of the file, which are sRGB-encoded."""
+    path.write_bytes(pictures.png(np.where(pixels / 255 <= 0.04045, pixels / 255 / 12.92,
+                                           ((pixels / 255 + 0.055) / 1.055)**2.4)))
 
 
 def whats(path):

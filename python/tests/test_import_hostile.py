@@ -5,15 +5,18 @@ import gzip
 import os
 import pathlib
 import re
+import resource
 import struct
 import subprocess
 import sys
 import zlib
 
 import pytest
+from imports import at_most, written
 
 import crt
 from crt import Kind
+from crt.importers.draft import Draft
 
 MITSUBA = '<scene version="3.0.0"><sensor type="perspective"/>%s</scene>'
 PBRT = 'Camera "perspective"\nWorldBegin\n%s\n'
@@ -34,6 +37,7 @@ def refused(path):
 
 @pytest.mark.parametrize("name, text", [
     ("encoding.xml", '<?xml version="1.0" encoding="x-unknown"?><scene version="3.0.0"/>'),
+    ("utf_7.xml", '<?xml version="1.0" encoding="utf-7"?><scene version="3.0.0"/>'),
     ("version.xml", '<scene version="%s"/>' % ("9" * 6000)),
     ("name.xml", MITSUBA % f'<include filename="{"a" * 5000}"/>'),
     ("kelvin.xml", MITSUBA % GLOW.format("nan")),
@@ -47,6 +51,24 @@ def refused(path):
 def test_what_is_no_scene(tmp_path, name, text):
     (tmp_path / name).write_text(text, encoding="utf-8")
     refused(tmp_path / name)
+
+
+@pytest.fixture
+def address_space():
+    """Half a tebibyte, so that a larger file cannot be read however readily the system lends memory."""
+    before, most = resource.getrlimit(resource.RLIMIT_AS)
+    half = 1 << 39 if most == resource.RLIM_INFINITY else min(1 << 39, most)
+    resource.setrlimit(resource.RLIMIT_AS, (half, most))
+    yield
+    resource.setrlimit(resource.RLIMIT_AS, (before, most))
+
+
+@pytest.mark.parametrize("name", ["huge.xml", "huge.pbrt"])
+def test_a_file_of_a_tebibyte_is_no_scene(tmp_path, address_space, name):
+    with open(tmp_path / name, "wb") as file:
+        file.truncate(1 << 40)  # It takes no blocks.
+    with at_most(5):
+        assert "not enough memory" in refused(tmp_path / name)
 
 
 def test_losses_show_no_control_characters(tmp_path):
@@ -96,11 +118,12 @@ def test_files_that_include_the_next_twice_are_refused(tmp_path, ending, line, w
     assert "double at each level" in refused(tmp_path / f"i0{ending}")
 
 
-def bomb(form, head=b"", size=1 << 29):
+def bomb(form, size=1 << 29):
+    """A packed stream of `size` equal bytes, without its end."""
     packer = zlib.compressobj(9, zlib.DEFLATED, form)
-    block = b"#" * (1 << 22)
-    parts = [packer.compress(head), *(packer.compress(block) for _ in range(size >> 22))]
-    return b"".join([*parts, packer.flush()])
+    head = packer.flush(zlib.Z_FULL_FLUSH)
+    block = packer.compress(b"#" * (1 << 22)) + packer.flush(zlib.Z_FULL_FLUSH)  # Needs nothing before it.
+    return head + block * (size >> 22)
 
 
 def test_files_that_unpack_to_a_thousand_times_their_size_are_refused(tmp_path):
@@ -135,8 +158,37 @@ def test_mutations_of_scenes_are_refused_in_a_sentence(tmp_path):
 
 
 def test_many_materials_without_a_name_take_linear_time(tmp_path):
-    path = tmp_path / "many.pbrt"
-    path.write_text(PBRT % "\n".join(
-        f'Material "diffuse" "rgb reflectance" [{i / 20000} 0.5 0.5]\nShape "sphere"' for i in range(20000)))
+    draft = Draft(tmp_path / "many.pbrt")
+    with at_most(6):
+        names = {draft.material("", {"type": "diffuse", "reflectance": i / 20000}) for i in range(20000)}
+    assert len(names) == len(draft.materials) == 20000
+
+
+def test_each_material_without_a_name_is_kept(tmp_path):
+    path = written(tmp_path, "many.pbrt", PBRT % "\n".join(
+        f'Material "diffuse" "rgb reflectance" [{i / 2000} 0.5 0.5]\nShape "sphere"' for i in range(2000)))
     materials = crt.import_scene(path).content["materials"]
-    assert sum("reflectance" in material for material in materials.values()) == 20000
+    assert sum("reflectance" in material for material in materials.values()) == 2000
+
+
+def test_many_references_in_one_shape_take_linear_time(tmp_path):
+    path = written(tmp_path, "many.xml", MITSUBA % (
+        '<shape type="sphere" id="a"/><shape type="shapegroup" id="g">' + '<ref id="a"/>' * 32000
+        + '</shape>'))
+    with at_most(5):
+        crt.import_scene(path)
+
+
+@pytest.mark.parametrize("file_format, properties, rows", [
+    ("ascii", "", b"-1\n" * 9),
+    ("binary_little_endian", "", struct.pack("<i", -1) * 9),
+    # A reader that takes -1 for all that follows reads it again for each row.
+    ("binary_little_endian", "property uchar material\n", struct.pack("<iB", -1, 0) * 9),
+], ids=["text", "binary", "among others"])
+def test_lists_of_less_than_no_values_are_refused(tmp_path, file_format, properties, rows):
+    written(tmp_path, "a.ply", f"ply\nformat {file_format} 1.0\nelement face 9\n"
+            f"property list int int vertex_indices\n{properties}end_header\n".encode() + rows)
+    scene = written(tmp_path, "s.xml", MITSUBA % (
+        '<shape type="ply"><string name="filename" value="a.ply"/>'
+        '<boolean name="flip_normals" value="true"/></shape>'))  # So that the importer reads the mesh.
+    assert "a list has -1 values" in refused(scene)

@@ -113,6 +113,59 @@ def test_an_index_of_0_or_less_renders_and_is_said(tmp_path):
         assert np.isfinite(rendered(one.scene, 1)).all()
 
 
+def said(losses):
+    return [(loss.what, loss.instead, loss.large) for loss in losses]
+
+
+def test_a_colour_as_an_index_of_refraction_is_said(tmp_path):
+    line = "its numbers at 610, 540 and 460 nm, and a straight line between them"
+    values = '<rgb name="eta" value="0.2, 0.4, 1.3"/><rgb name="k" value="3, 3, 3"/>'
+    made = of_mitsuba(tmp_path, f'<shape type="sphere"><bsdf type="conductor">{values}</bsdf></shape>')
+    assert said(made.losses) == [("a colour as 'eta' of bsdf 'conductor'", line, False)]
+    eta = next(of["eta"] for of in made.content["materials"].values() if "eta" in of)
+    assert eta["table"] == {"nm": [460, 540, 610], "value": [1.3, 0.4, 0.2]}
+    metal = '"rgb eta" [0.2 0.4 1.3] "rgb k" [3 3 3]'
+    losses = of_pbrt(tmp_path, "", f'Material "conductor" "float roughness" 0 {metal}\n' + SPHERE)
+    assert said(losses) == [("a colour as 'eta' of material 'conductor'", line, False)]
+
+
+@pytest.mark.parametrize("scattered, wanted", [
+    ("0 0 0", ("a colour as 'sigma_a' of medium 'homogeneous'", False)),
+    ("1 2 3", ("participating media", True))])
+def test_a_colour_that_glass_absorbs_is_said(tmp_path, scattered, wanted):
+    losses = of_pbrt(tmp_path, "", 'MakeNamedMedium "ink" "string type" "homogeneous" "rgb sigma_a" [1 2 3] '
+                     f'"rgb sigma_s" [{scattered}]\nMediumInterface "ink" ""\nMaterial "dielectric"\n'
+                     + SPHERE)
+    assert [(loss.what, loss.large) for loss in losses] == [wanted]
+
+
+def test_an_image_that_emits_and_cannot_be_read_is_white_and_said(tmp_path):
+    for name, content in (("a.bmp", b"BM"), ("a.png", b"no image")):
+        written(tmp_path, name, content)
+        image = f'type="bitmap"><string name="filename" value="{name}"/></texture>'
+        made = of_mitsuba(tmp_path, '<shape type="sphere"><emitter type="area"><texture name="radiance" '
+                          f'{image}</emitter></shape>')
+        assert said(made.losses) == [(f"a texture of type '{name[1:]}' that emits light",
+                                      "white of radiance 1", True)]
+        assert made.content["objects"][0]["emission"]["radiance"] == {"illuminant": "D65", "scale": 1.0}
+
+
+def test_curtains_that_let_no_light_through_are_a_large_loss(tmp_path):
+    losses = of_pbrt(tmp_path, "", 'Material "diffusetransmission" "rgb transmittance" [0.5 0.5 0.5] '
+                                   '"float scale" 1\n' + SPHERE)
+    assert said(losses) == [("material 'diffusetransmission'", "diffuse without transmission", True)]
+
+
+@pytest.mark.parametrize("given, wanted", [
+    ("", True), ('<string name="distribution" value="beckmann"/>', True),
+    ('<string name="distribution" value="ggx"/>', False)])
+def test_the_tails_of_other_microfacets_are_said(tmp_path, given, wanted):
+    made = of_mitsuba(tmp_path, f'<shape type="sphere"><bsdf type="roughdielectric">{given}</bsdf></shape>')
+    assert said(made.losses) == wanted * [(
+        "microfacets of Beckmann's distribution", "GGX of the same width (20 % of its facets lean by more "
+        "than two widths, of Beckmann's 2 %)", False)]
+
+
 def test_all_missing_files_are_listed_at_once(tmp_path):
     written(tmp_path, "there.png", b"")
     body = "".join(f'<shape type="{kind}"><string name="filename" value="{name}"/></shape>\n'

@@ -6,7 +6,7 @@ import zlib
 
 import numpy as np
 import pytest
-from imports import LUMINANCE, imported, near, pfm, quadrants, rendered, whats, written
+from imports import LUMINANCE, imported, near, pfm, quadrants, rendered, whats, write_png, written
 
 import crt
 
@@ -178,6 +178,19 @@ def test_materials_become_those_of_crt(tmp_path):
                      ' value="1"/><float name="specular" value="0.5"/></bsdf></bsdf>')
     assert top["base_metalness"] == 1 and top["specular_roughness"] == 0.5
     near(top["specular_ior"], 1.5, 1e-9)
+
+
+def test_two_shapes_have_one_material_with_an_array(tmp_path):
+    write_png(tmp_path / "t.png", np.uint8([[[0] * 3, [187] * 3]]))
+    path = scene(tmp_path, '<bsdf type="mask" id="holes"><texture name="opacity" type="bitmap"><string '
+                 'name="filename" value="t.png"/></texture><bsdf type="diffuse"/></bsdf>'
+                 + '<shape type="rectangle"><ref id="holes"/></shape>' * 2)
+    content = crt.import_scene(path).content
+    (name,) = {thing["material"] for thing in content["objects"]}
+    assert len(content["objects"]) == 2
+    opacity = content["materials"][name]["opacity"]["texture"]
+    assert np.allclose(opacity, [[0, 0.4969]], atol=1e-3)
+    assert imported(path, 1).shape == (16, 16, 3)
 
 
 def test_plastic_without_nonlinear_has_the_albedo_of_mitsubas(tmp_path):

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from imports import LUMINANCE, imported, near, pfm, quadrants, rendered, whats, written
+from imports import LUMINANCE, imported, near, pfm, quadrants, rendered, whats, write_png, written
 
 import crt
 
@@ -371,10 +371,15 @@ def test_numbers_in_encoded_images_are_decoded(tmp_path):
     assert np.allclose(rough["roughness"]["texture"], (188 / 255)**0.25, atol=1e-3)
 
 
-def write_png(path, pixels):
-    from crt import pictures
-    path.write_bytes(pictures.png(np.where(pixels / 255 <= 0.04045, pixels / 255 / 12.92,
-                                           ((pixels / 255 + 0.055) / 1.055)**2.4)))
+def test_two_shapes_have_one_material_with_an_array(tmp_path):
+    write_png(tmp_path / "t.png", np.uint8([[0, 187], [255, 187]])[:, :, None].repeat(3, 2))
+    path = scene(tmp_path, 'Texture "t" "float" "imagemap" "string filename" "t.png"\n'
+                 'Material "diffuse"\n' + 2 * (quad(more='"texture alpha" "t"') + "\n"))
+    content = crt.import_scene(path).content
+    (name,) = {thing["material"] for thing in content["objects"]}
+    assert len(content["objects"]) == 2 and set(content["materials"]) == {name}
+    assert content["materials"][name]["opacity"]["texture"].shape == (2, 2)
+    assert imported(path, 1).shape == (16, 16, 3)
 
 
 def test_matrices_are_given_by_columns(tmp_path):

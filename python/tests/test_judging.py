@@ -9,6 +9,12 @@ import crt
 from conftest import BOX, usable
 
 
+@pytest.fixture(autouse=True)
+def no_pages(monkeypatch):
+    """test_report.py has the pages of runs, which take longer than these runs themselves."""
+    monkeypatch.setenv("CRT_PYTHON", "")
+
+
 def test_the_same_samples_are_the_same_image(box):
     a, b = (crt.render(box, spp=16, backend=name) for name in (usable()[0], usable()[-1]))
     judged = crt.compare(a, b.film, all_channels=True)
@@ -41,9 +47,11 @@ def test_what_is_no_image_is_an_error(tmp_path):
     assert "a.exr" in str(raised.value)
 
 
-def test_a_run_of_converge(box, tmp_path):
-    box["integrator.max_depth"] = 2
-    judged = crt.converge(box, tmp_path / "run", backends=[usable()[0]], time_limit=3, replicates=4,
+def test_a_run_of_converge(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "--help").write_text(BOX)  # A name that looks like an option.
+    scene = crt.load("--help", set={"integrator.max_depth": 2})
+    judged = crt.converge(scene, tmp_path / "run", backends=[usable()[0]], time_limit=1, replicates=4,
                           vary={"sampler": ["sobol", "independent"]}, resolution=24)
     assert judged.folder == tmp_path / "run"
     assert "sampler=sobol,independent" in judged.figures["environment"]["commands"][0]
@@ -70,6 +78,6 @@ def test_a_backend_is_verified(tmp_path):
 
 def test_what_the_program_says_goes_to_the_logger(box, tmp_path, caplog):
     with caplog.at_level(logging.INFO, logger="crt"):
-        crt.converge(box, tmp_path / "run", backends=[usable()[0]], time_limit=2, replicates=4,
+        crt.converge(box, tmp_path / "run", backends=[usable()[0]], time_limit=1, replicates=4,
                      resolution=24)
     assert any("wrote" in record.message for record in caplog.records)

@@ -44,7 +44,7 @@ def kernel(tmp_path_factory):
     values = {"JUPYTER_PATH": str(folder), "JUPYTER_CONFIG_DIR": str(folder / "config"),
               "JUPYTER_RUNTIME_DIR": str(folder / "runtime"), "IPYTHONDIR": str(folder / "ipython"),
               "MPLCONFIGDIR": str(folder / "matplotlib"),
-              "CRT_NOTEBOOK_SCALE": "0.25"}
+              "CRT_NOTEBOOK_SCALE": "0.2"}
     with pytest.MonkeyPatch.context() as patch:
         for name, value in values.items():
             patch.setenv(name, value)

@@ -1,6 +1,7 @@
 """Pages of `python -m crt report`: the page shows the data in the JSON of a run, it has no external
 resources, and for a folder without a run no page is begun."""
 
+import functools
 import json
 import os
 import pathlib
@@ -85,6 +86,20 @@ def page_of(folder, *more):
     return Page(next(folder / name for name in ("report.html", "verify.html") if (folder / name).exists()))
 
 
+page_as_measured = functools.cache(page_of)  # Of a folder that no test has edited.
+
+
+def without_points(data):
+    """No figure is left to draw."""
+    data["scenes"][0]["maps"] = {"left_out": "no codec", "configurations": [], "scales": []}
+    data["scenes"][0]["findings"] = []
+    data["references"] = []
+    for fit in data["fits"]:
+        fit.update(points=[], relative_mean_bias_rgb=None)
+        for name in ("time", "error", "slope_against_samples", "efficiency_per_second", "targets"):
+            fit.pop(name, None)
+
+
 def fit_of(data, variant):
     return next(fit for fit in data["fits"] if fit["variant"] == variant and not fit["omitted"])
 
@@ -94,7 +109,7 @@ def fit_of(data, variant):
 
 @needs_backend
 def test_every_configuration_has_its_verdict_and_why(converged):
-    page = page_of(converged)
+    page = page_as_measured(converged)
     data = json.loads((converged / "summary.json").read_text())
     for fit in data["fits"]:
         label = f"{fit['backend']}, {fit['variant']}"
@@ -143,7 +158,7 @@ def test_figures_of_a_configuration_stand_in_its_row(converged, edited):
 
 @needs_backend
 def test_findings_notes_and_how_it_was_measured_are_told(converged):
-    page = page_of(converged)
+    page = page_as_measured(converged)
     data = json.loads((converged / "summary.json").read_text())
     environment = data["environment"]
     sentences = [finding["text"] for scene in data["scenes"] for finding in scene["findings"]]
@@ -161,7 +176,7 @@ def test_findings_notes_and_how_it_was_measured_are_told(converged):
 
 @needs_backend
 def test_maps_are_of_the_same_samples_and_have_names(converged):
-    page = page_of(converged)
+    page = page_as_measured(converged)
     data = json.loads((converged / "summary.json").read_text())
     maps = data["scenes"][0]["maps"]
     samples = {of["samples_per_pixel"] for of in maps["configurations"]}
@@ -178,7 +193,7 @@ def test_maps_are_of_the_same_samples_and_have_names(converged):
 @needs_backend
 @pytest.mark.parametrize("run", ["converged", "verified"])
 def test_a_page_asks_for_nothing_and_its_names_are_its_own(run, request):
-    page = page_of(request.getfixturevalue(run))
+    page = page_as_measured(request.getfixturevalue(run))
     assert page.links
     for link in page.links:
         assert link.startswith("data:image/png;base64,") or link.strip("'\"")[1:] in page.ids, link[:60]
@@ -212,16 +227,7 @@ def test_void_rows_and_failures_are_named(converged, edited):
 
 @needs_backend
 def test_a_run_without_points_and_without_maps_has_a_page(converged, edited):
-    def change(data):
-        data["scenes"][0]["maps"] = {"left_out": "no codec", "configurations": [], "scales": []}
-        data["scenes"][0]["findings"] = []
-        data["references"] = []
-        for fit in data["fits"]:
-            fit.update(points=[], relative_mean_bias_rgb=None)
-            for name in ("time", "error", "slope_against_samples", "efficiency_per_second", "targets"):
-                fit.pop(name, None)
-
-    page = page_of(edited(converged, change))
+    page = page_of(edited(converged, without_points))
     assert "Left out: no codec" in page.text and "Reference: none." in page.text
 
 
@@ -263,7 +269,7 @@ KEPT = {"format", "verdict", "file", "id", "tone", "kind", "colours"}
 
 @needs_backend
 def test_expected_measured_and_tolerance_are_in_sight(verified):
-    page = page_of(verified)
+    page = page_as_measured(verified)
     data = json.loads((verified / "verify.json").read_text())
     seen = " ".join("".join(page.visible).split())
     outcomes = [outcome for case in data["cases"] for outcome in case["outcomes"]]
@@ -333,7 +339,8 @@ def test_a_folder_that_is_no_run_is_refused(tmp_path, capsys):
 @needs_backend
 @pytest.mark.parametrize("run", ["converged", "verified"])
 def test_json_that_lost_a_part_is_refused_and_no_page_is_begun(run, request, edited, capsys):
-    folder = edited(request.getfixturevalue(run), lambda data: None)
+    change = without_points if run == "converged" else dict.copy
+    folder = edited(request.getfixturevalue(run), change)
     (folder / "report.html").write_text("as it was")
     (folder / "verify.html").write_text("as it was")
     path = next(folder / name for name in ("summary.json", "verify.json") if (folder / name).exists())

@@ -165,7 +165,7 @@ def test_arrays_come_back_and_are_saved(tmp_path):
 
 
 def test_models_are_written_too(files):
-    model = crt.load(files / "parts/square.obj")
+    model = crt.load(files / "parts/square.obj", set={"film.resolution": [24, 16]})
     assert "objects.0.obj" in model and same(xyz(crt.scene(model.to_dict())), xyz(model))
 
 

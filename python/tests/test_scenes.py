@@ -4,6 +4,8 @@ import gc
 import logging
 import os
 import pathlib
+import signal
+import tempfile
 
 import numpy as np
 import pytest
@@ -137,6 +139,72 @@ def test_files_of_arrays_go_with_the_scene():
     del copy
     gc.collect()
     assert not files[0].parent.exists()
+
+
+def forked_with_arrays(folder):
+    """A process with a scene of a dict, and the folder of its arrays."""
+    before = set(folder.iterdir())
+    made, begun = os.pipe()
+    process = os.fork()
+    if process == 0:
+        kept = crt.scene(yaml.safe_load(BOX))
+        os.write(begun, b"x")
+        signal.pause()
+        os._exit(kept is None)
+    assert os.read(made, 1) == b"x"
+    (own,) = set(folder.iterdir()) - before
+    return process, own
+
+
+def unlocked(path):
+    path.mkdir(parents=True)
+    (path / "lock").touch()
+    return path
+
+
+def test_folders_of_killed_processes_are_removed_and_no_others(tmp_path, monkeypatch):
+    temporary = tmp_path / "temporary"
+    others = [unlocked(tmp_path / "linked"), unlocked(temporary / "other-arrays-1")]
+    if os.geteuid() == 0:
+        others.append(unlocked(temporary / "crt-arrays-of-another-user"))
+        os.chown(others[-1], 1, 1)
+    others += [temporary / "crt-arrays-without-a-lock", temporary / "crt-arrays-link"]
+    others[-2].mkdir()
+    others[-1].symlink_to(tmp_path / "linked")
+    monkeypatch.setattr(tempfile, "tempdir", str(temporary))
+    (killed, left), (living, kept) = forked_with_arrays(temporary), forked_with_arrays(temporary)
+    try:
+        os.kill(killed, signal.SIGKILL)
+        os.waitpid(killed, 0)
+        own = crt.scene(yaml.safe_load(BOX))._source.folder.path
+        assert not left.exists() and kept.exists()
+        assert all((path / "lock").exists() or path == others[-2] for path in others) and others[-2].exists()
+    finally:
+        os.kill(living, signal.SIGKILL)
+        os.waitpid(living, 0)
+    assert own.parent.parent == temporary and not own.parent.exists()  # It went with its scene.
+
+
+def test_a_forked_process_leaves_the_folder_of_arrays(tmp_path, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    scene = crt.scene(yaml.safe_load(BOX))
+    process = os.fork()
+    if process == 0:
+        del scene
+        gc.collect()
+        os._exit(0)
+    assert os.waitpid(process, 0)[1] == 0
+    assert scene._source.folder.path.is_dir()
+    del scene
+    gc.collect()
+    assert not list(tmp_path.iterdir())
+
+
+def test_folders_of_arrays_take_one_open_file():
+    before = len(os.listdir("/proc/self/fd"))
+    scenes = [crt.scene(yaml.safe_load(BOX)) for _ in range(20)]
+    assert len({scene._source.folder.path for scene in scenes}) == 20
+    assert len(os.listdir("/proc/self/fd")) <= before + 1
 
 
 def test_messages_go_to_logging(caplog):

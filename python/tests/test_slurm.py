@@ -120,6 +120,13 @@ def test_merge_says_what_is_missing(folder):
     (["my box.yaml", "--nodes", 2, "-o", "a.jpg"], 2, "not '"),
     (["my box.yaml", "--nodes", 2, "-o", "no/a.exr"], 6, "there is no folder"),
     (["my box.yaml", "--nodes", 2, "--set", "film.resolutio=[2,2]"], 3, "did you mean 'resolution'"),
+    (["my box.yaml", "--nodes", 2, "--checkpoint-every", "never"], 2, "--checkpoint-every takes a duration"),
+    (["my box.yaml", "--nodes", 2, "-t", "all"], 2, "--threads takes a whole number"),
+    (["my box.yaml", "--nodes", 2, "--seed", "x"], 2, "--seed"),
+    (["my box.yaml", "--nodes", 2, "--crop", "0,0,1"], 2, "--crop"),
+    (["my box.yaml", "--nodes", 2, "--spp", 10**20], 2, "--samples"),
+    (["my box.yaml", "--nodes", 2, "-b", "embre"], 4, "'embre' is unknown"),
+    (["my box.yaml", "--nodes", 2, "-b", "./none.so"], 2, "no backend file './none.so'"),
 ])
 def test_bad_requests(folder, arguments, code, words):
     (folder / "bad.yaml").write_text("crt: 1\nfilm:\n  resolution: [a, b]\n")

@@ -122,7 +122,7 @@ def lists(data, offset, words, order, count, properties):
     rows = {name: [] for name, _, _ in properties}
     if words is None and len(properties) == 1 and count:
         name, form, counts = properties[0]
-        size = int(np.frombuffer(data, order + counts, 1, offset)[0])
+        size = length(np.frombuffer(data, order + counts, 1, offset)[0])
         row = np.dtype([("size", order + counts), ("values", order + form, (size,))])
         if offset + row.itemsize * count <= len(data):
             table = np.frombuffer(data, row, count, offset)
@@ -131,18 +131,24 @@ def lists(data, offset, words, order, count, properties):
     for _ in range(count):
         for name, form, counts in properties:
             if words is not None:
-                size = int(next(words)) if counts else 1
+                size = length(next(words)) if counts else 1
                 rows[name].append([float(next(words)) for _ in range(size)])
                 continue
             size = 1
             if counts:
-                size = int(np.frombuffer(data, order + counts, 1, offset)[0])
+                size = length(np.frombuffer(data, order + counts, 1, offset)[0])
                 offset += np.dtype(counts).itemsize
-                if size < 0:
-                    raise Damaged(f"a list has {size} values")
             rows[name].append(np.frombuffer(data, order + form, size, offset).tolist())
             offset += np.dtype(form).itemsize * size
     return rows, offset
+
+
+def length(number):
+    """Of a list. Raises Damaged where it is below 0."""
+    size = int(number)
+    if size < 0:
+        raise Damaged(f"a list has {size} values")
+    return size
 
 
 def fans(polygons):

@@ -162,8 +162,8 @@ class Reader:
         root = self.root(self.path)
         scene = Plugin("scene", "scene", root.place)
         self.fill(scene, root, [self.path.resolve()])
-        for plugin, name, element in self.references:
-            plugin.parts[plugin.parts.index((name, element))] = (name, self.named(element))
+        for plugin, number, name, element in self.references:
+            plugin.parts[number] = (name, self.named(element))
         refuse_circles(scene, [], set())
         for name in sorted(self.given - self.used):
             raise Error(f"no value in '{self.path}' uses the parameter '${name}'"
@@ -253,17 +253,16 @@ class Reader:
         # The referenced element may come later.
         name = self.name_of(element)
         element.attributes["id"] = self.attribute(element, "id")
+        self.references.append((plugin, len(plugin.parts), name, element))
         plugin.parts.append((name, element))
-        self.references.append((plugin, name, element))
 
     def named(self, element):
         name = element.attributes["id"]
-        known = self.ids | self.aliases
         for _ in range(DEPTH):
             if name in self.ids:
                 return self.ids[name]
             name = self.aliases.get(name, name)
-        refuse(element.place, f"there is no '{name}'" + suggestion(name, known))
+        refuse(element.place, f"there is no '{name}'" + suggestion(name, self.ids | self.aliases))
 
     def include(self, plugin, element, trail):
         step(element.place, FILE_COST)

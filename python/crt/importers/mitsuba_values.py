@@ -93,8 +93,9 @@ class Values:
         else:
             made = self.plain(plugin, name, default)
         if isinstance(made, dict) and "rgb" in made:
-            red, green, blue = made["rgb"]
-            return spectra.table([460, 540, 610], [blue, green, red], "clamp")
+            self.losses.add(plugin.place_of(name), f"a colour as '{name}' of {plugin}",
+                            spectra.COLOR_OF_ANY_SIZE)
+            return spectra.of_color(made["rgb"])
         if isinstance(made, dict) and ("table" in made or "file" in made):
             made = made | ({"outside": "clamp"} if "outside" in made else {})
         return made

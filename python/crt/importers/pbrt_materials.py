@@ -2,6 +2,8 @@
 
 import pathlib
 
+import numpy as np
+
 from . import spectra
 from .images import powered
 from .losses import present, refuse, step, suggestion
@@ -79,8 +81,8 @@ class Materials:
         glass = content["type"] in ("dielectric", "rough_dielectric")
         if medium is None or not glass or "opacity" in content:  # crt wants such a body closed.
             return content
-        scattered = self.values.unbounded(medium, "sigma_s", 1.0)
-        if medium.name != "homogeneous" or medium.has("preset") or scattered != 0:
+        scatters = not medium.has("sigma_s") or np.any(medium.raw("sigma_s")[1] != 0)
+        if medium.name != "homogeneous" or medium.has("preset") or scatters:
             return content
         absorbed = self.values.unbounded(medium, "sigma_a", 1.0)
         return content | {"absorption": spectra.scaled(absorbed, medium.number("scale", 1))}

@@ -110,10 +110,13 @@ class Values:
             if parameters.has(name):
                 self.losses.add(parameters.values[name][2], f"a texture as '{name}'", "its default")
             return default
-        if isinstance(made, list):
-            return made[0] if spectra.is_grey(made) else \
-                spectra.table([460, 540, 610], made[::-1], "clamp")
-        return made
+        if not isinstance(made, list):
+            return made
+        if spectra.is_grey(made):
+            return made[0]
+        self.losses.add(parameters.values[name][2], f"a colour as '{name}' of {parameters}",
+                        spectra.COLOR_OF_ANY_SIZE)
+        return spectra.of_color(made)
 
     def light(self, parameters, name, scale):
         """The spectrum of a light. Its luminance is `scale`, independent of its own size; of a colour or a

@@ -45,6 +45,15 @@ def table(nm, values, outside="zero", scale=1):
     return made | ({} if scale == 1 else {"scale": float(scale)})
 
 
+COLOR_OF_ANY_SIZE = "its numbers at 610, 540 and 460 nm, and a straight line between them"
+
+
+def of_color(values):
+    """A spectrum of any size, such as an index of refraction, that a file gives as [r, g, b]."""
+    red, green, blue = values
+    return table([460, 540, 610], [blue, green, red], "clamp")
+
+
 def read_spd(path):
     """Wavelengths and values of a file of two columns. Raises ValueError, with the line, or OSError."""
     most = 1 << 26  # Bytes: a hundred times the longest tables.
