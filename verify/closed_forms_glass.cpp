@@ -81,7 +81,7 @@ void fresnel(Context& context) {
         // One decision by one stratified number: its share is right to 1/N.
         context.estimate(where + ", as a dielectric",
                          outside(a.degrees, fmt::format("{{type: dielectric, ior: {}}}", a.ior)),
-                         meanRadiance, expected, 0.001, {.samples = 4096, .most = 65536});
+                         meanRadiance, expected, 0.001, {.samples = 1024, .most = 65536});
     }
     // From inside: the lamp below is seen by reflection, nothing by refraction. Beyond the critical angle
     // all of it.
@@ -103,7 +103,7 @@ void fresnel(Context& context) {
                          2e-6, {{0, "light is refracted where it is totally reflected"}});
     context.estimate("from inside, 40°", inside(40, 2), meanRadiance,
                      fresnelDielectric(std::cos(40 * kDegree), 1 / kIndex), 0.002,
-                     {.samples = 4096, .most = 65536});
+                     {.samples = 1024, .most = 65536});
     if (!context.atLeast(Level::Merge)) return;
     // Diffuse light: a white floor sees the environment through the interface alone; what the interface
     // sends back is not scattered again.
@@ -118,7 +118,7 @@ void fresnel(Context& context) {
             .quad("interface", interface, "glass")
             .yaml();
     };
-    const Effort effort{.samples = 4096, .most = 65536};
+    const Effort effort{.samples = 1024, .most = 65536};
     context.estimate("diffuse light into glass, (1 − 0.0917779593)/n²",
                      diffuse("[[-1000,1,-1000],[1000,1,-1000],[1000,1,1000],[-1000,1,1000]]"), meanRadiance,
                      (1 - reflected_outside) / (kIndex * kIndex), 0.001, effort,
@@ -141,10 +141,10 @@ void slab(Context& context) {
     };
     const double r = fresnelDielectric(1, kIndex), transmitted = (1 - r) / (1 + r);
     context.estimate("transmitted", scene(-3, "[[-9,-9,{0}],[9,-9,{0}],[9,9,{0}],[-9,9,{0}]]"), meanRadiance,
-                     transmitted, 0.0005, {.samples = 4096, .most = 65536},
+                     transmitted, 0.0005, {.samples = 1024, .most = 65536},
                      {{(1 - r) * (1 - r), "light reflected to and fro inside the slab is missing"}});
     context.estimate("reflected", scene(8, "[[-9,-9,{0}],[-9,9,{0}],[9,9,{0}],[9,-9,{0}]]"), meanRadiance,
-                     1 - transmitted, 0.005, {.samples = 4096, .most = 262144},
+                     1 - transmitted, 0.005, {.samples = 1024, .most = 262144},
                      {{r, "only the front face reflects"}});
 }
 
@@ -193,7 +193,7 @@ void glassCube(Context& context) {
             fmt::format("along the axis at depth {}, n²(1 − 0.04^{})", depth, depth),
             scene("{position: [0,0,0], target: [0,0,1], fov: 0.001}", "{resolution: [4, 4]}", depth),
             meanRadiance, kIndex * kIndex * (1 - std::pow(r, depth)), 0.0005,
-            {.samples = 4096, .most = 65536});
+            {.samples = 1024, .most = 65536});
     // Throughput stays 1 for ever, so that only the depth ends these paths.
     const std::string lost =
         scene("{position: [0,0,0], target: [1,1,1], fov: 1}", "{resolution: [1, 1]}", 1000);

@@ -55,7 +55,7 @@ void roughGlassFurnace(Context& context) {
                                      .quad("glass", kInterface, "glass")
                                      .yaml(),
                                  meanRadiance, seen(cosine, eta, roughness), 0.002,
-                                 {.samples = 1024, .most = 65536},
+                                 {.samples = 256, .most = 65536},
                                  mistakesOfRoughGlass(cosine, eta, roughness));
             }
     // However rough, clear glass in light from everywhere cannot be seen.
@@ -92,7 +92,7 @@ void roughGlassFurnace(Context& context) {
                           "[[0,1,3,2],[4,6,7,5],[2,3,7,6],[0,4,5,1],[0,2,6,4],[1,5,7,3]]", "black",
                           "1, two_sided: true")
                     .yaml(),
-                meanRadiance, seen(cosine, kIndex, roughness), 0.002, {.samples = 1024, .most = 16384},
+                meanRadiance, seen(cosine, kIndex, roughness), 0.002, {.samples = 256, .most = 16384},
                 mistakesOfRoughGlass(cosine, kIndex, roughness));
         }
 }
@@ -124,7 +124,7 @@ void roughGlassLimits(Context& context) {
                 .quad("bottom", "[[-900,-1,-900],[-900,-1,900],[900,-1,900],[900,-1,-900]]", "black")
                 .yaml(),
             meanRadiance, fresnelDielectric(std::cos(degrees * kDegree), kIndex), 0.002,
-            {.samples = 4096, .most = 65536});
+            {.samples = 1024, .most = 65536});
 }
 
 /// Where all light is of wavelengths at which the index is the same, those at which it is not must not show:
@@ -146,7 +146,7 @@ void roughDispersion(Context& context) {
             {scene("{table: {nm: [360, 520, 560, 830], value: [1.8, 1.8, 1.5, 1.5]}}", roughness),
              scene("1.8", roughness)},
             [](const std::vector<Film>& f) { return radiance(f[0]) / radiance(f[1]); }, 1, 0.005,
-            {.samples = 1024, .most = 65536},
+            {.samples = 256, .most = 65536},
             {{4, "one wavelength is taken for all four, and counted four times"}});
 }
 
@@ -160,7 +160,7 @@ void pane(Context& context) {
             .quad("bottom", "[[-900,-1,-900],[-900,-1,900],[900,-1,900],[900,-1,-900]]", "black")
             .yaml();
     };
-    const Effort effort{.samples = 4096, .most = 65536};
+    const Effort effort{.samples = 1024, .most = 65536};
     for (const double ior : {1.5, 1 / 1.5})
         for (const double degrees : {0.0, 40.0, 70.0}) {
             const double cosine = std::cos(degrees * kDegree), r = fresnelDielectric(cosine, ior);
@@ -245,7 +245,7 @@ void plasticFurnace(Context& context) {
                           "1, two_sided: true")
                     .yaml(),
                 meanRadiance, plasticAlbedo(cosine, 0.5, kIndex, roughness), 0.002,
-                {.samples = 1024, .most = 16384}, mistakes(cosine, 0.5, roughness));
+                {.samples = 256, .most = 16384}, mistakes(cosine, 0.5, roughness));
         }
     context.sameBits("an index of 1 is Lambert's law",
                      context.render(Stage(eyeFacing(30, 1))
@@ -274,7 +274,7 @@ void absorbingSlab(Context& context) {
     constexpr const char* inside = "{position: [0, 0, 0.05], target: [0, 0, -5], fov: 0.001}";
     constexpr const char* lamp = "[[-9,-9,-3],[9,-9,-3],[9,9,-3],[-9,9,-3]]";
     const double r = fresnelDielectric(1, kIndex);
-    const Effort effort{.samples = 4096, .most = 65536};
+    const Effort effort{.samples = 1024, .most = 65536};
     for (const double sigma : {0.0, 0.7, 3.0}) {
         const double a = std::exp(-0.5 * sigma), through = (1 - r) * (1 - r) * a / (1 - r * r * a * a);
         context.estimate(fmt::format("absorption {}: transmitted", sigma),

@@ -102,7 +102,7 @@ void limits(Context& context) {
                          return 0.75 * (gloss + (1 - gloss) * 0.6) +
                                 0.25 * tintedMetalAlbedo(0.5, 0.6, 1, 1, 0.5);
                      }(),
-                     2e-3, {.samples = 1024, .most = 65536});
+                     2e-3, {.samples = 256, .most = 65536});
     // The same bits, in which nothing is left of the other slabs.
     const auto same = [&](const char* what, const std::string& keys, const std::string& material) {
         const auto seen = [&](const std::string& m) {
@@ -272,7 +272,7 @@ void fuzz(Context& context) {
                 if (clear) stage.box("it", {-2, -1, -2}, {2, 0, 2}, "it");
                 else stage.quad("it", "[[-2,0,-2],[-2,0,2],[2,0,2],[2,0,-2]]", "it");
                 context.estimate(fmt::format("white on {}, roughness {}, at {}°", base, roughness, degrees),
-                                 stage.yaml(), meanRadiance, 1, 5e-3, {.samples = 1024, .most = 65536});
+                                 stage.yaml(), meanRadiance, 1, 5e-3, {.samples = 256, .most = 65536});
             }
             context.relative(fmt::format("grey on black, roughness {}, at {}°", roughness, degrees),
                              radiance(context.render(floorOf(on(black, weight, color, roughness), degrees),
@@ -297,11 +297,11 @@ void fuzz(Context& context) {
                 .yaml();
         };
         context.estimate(fmt::format("black on a clear body, at {}°", degrees), body(1), meanRadiance, kept,
-                         5e-3, {.samples = 1024, .most = 65536},
+                         5e-3, {.samples = 256, .most = 65536},
                          {{kept * kept, "there is fuzz on the inside, too"}});
         context.estimate(fmt::format("black on a clear body, seen from within, at {}°", degrees),
         body(-0.5),
-                         meanRadiance, 1, 1e-3, {.samples = 1024, .most = 65536},
+                         meanRadiance, 1, 1e-3, {.samples = 256, .most = 65536},
                          {{kept, "there is fuzz on the inside, too"}});
     }
     // A mirror under fuzz is seen by light sampling, too.
@@ -311,7 +311,7 @@ void fuzz(Context& context) {
             .quad("it", "[[-2,0,-2],[-2,0,2],[2,0,2],[2,0,-2]]", "it")
             .set("environment", "{radiance: 1, light_sampling: true}");
         context.estimate(fmt::format("on a mirror, {}", technique), stage.yaml(), meanRadiance, 1, 5e-3,
-                         {.samples = 1024, .most = 65536});
+                         {.samples = 256, .most = 65536});
     }
 }
 
@@ -356,7 +356,7 @@ void dispersion(Context& context) {
              [bin](const std::vector<Film>& films) { return meanOfBin(films[0], bin); },
              expected});
     }
-    context.estimate(asked, {scene}, 0.01, {.samples = 1024, .most = 65536},
+    context.estimate(asked, {scene}, 0.01, {.samples = 256, .most = 65536},
                      {{fresnelDielectric(1, kMiddle), "the index is the same at all wavelengths"}});
 }
 

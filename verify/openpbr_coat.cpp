@@ -16,7 +16,7 @@
 namespace crt::verify {
 namespace {
 
-constexpr Effort kEffort{.samples = 1024, .most = 65536};
+constexpr Effort kEffort{.samples = 256, .most = 65536};
 
 std::string under(const Lacquer& coat, const std::string& base, double weight = 1) {
     return fmt::format("{{type: openpbr, {}, coat_weight: {}, coat_color: {}, coat_roughness: {}, "

@@ -108,7 +108,7 @@ void lightsBehindPanes(Context& context) {
             context.estimate(fmt::format("{}, {} of them", what, panes),
                              {floorUnderPanes(panes, material).set("lights", sun).yaml(),
                               floorUnderPanes(0, material).set("lights", sun).yaml()},
-                             ratioOfTwo, std::pow(through, panes), 0.003, {.samples = 1024, .most = 65536},
+                             ratioOfTwo, std::pow(through, panes), 0.003, {.samples = 256, .most = 65536},
                              {{through, "all surfaces decide alike"}});
     // A film on one side, as seen by an eye.
     const auto filmed = [&](double degrees) {
@@ -130,7 +130,7 @@ void lightsBehindPanes(Context& context) {
         context.estimate(fmt::format("under a film, at {}°", degrees),
                          {floorUnderPanes(1, material).set("lights", slanting).yaml(),
                           floorUnderPanes(0, material).set("lights", slanting).yaml()},
-                         ratioOfTwo, filmed(degrees), 0.002, {.samples = 1024, .most = 65536},
+                         ratioOfTwo, filmed(degrees), 0.002, {.samples = 256, .most = 65536},
                          {{paneTransmittance(std::cos(degrees * kDegree), kIndex), "there is no film"}});
     }
 }
@@ -139,7 +139,7 @@ void techniquesThroughPanes(Context& context) {
     const auto power = [](double cosine, int panes) {
         return std::pow(paneTransmittance(cosine, kIndex), panes);
     };
-    const Effort effort{.samples = 1024, .most = 262144};
+    const Effort effort{.samples = 256, .most = 262144};
     for (const int panes : {1, 3}) {
         const double sky =
             rectangleIntegral([&](double c, double) { return 2 * c * power(c, panes); }, 0, 1, 0, 1);
@@ -199,7 +199,7 @@ void stackOfPanes(Context& context) {
     const double once = paneTransmittance(std::sqrt(0.5), kIndex);
     const auto seen = [&](const char* what, int panes, const char* more, double expected) {
         context.estimate(what, {stack(panes, "{max_depth: 0}", more), stack(0, "{max_depth: 0}", "")},
-                         ratioOfTwo, expected, 0.01, {.samples = 1024, .most = 65536},
+                         ratioOfTwo, expected, 0.01, {.samples = 256, .most = 65536},
                          {{0, "panes are opaque"}});
     };
     seen("the sky behind 15 panes, without scattering", 15, "", std::pow(once, 15));

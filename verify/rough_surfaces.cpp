@@ -66,7 +66,7 @@ void roughFurnace(Context& context) {
                         "room", "[[-2,0,-2],[2,0,-2],[-2,1,-2],[2,1,-2],[-2,0,2],[2,0,2],[-2,1,2],[2,1,2]]",
                         "[[0,1,3,2],[4,6,7,5],[2,3,7,6],[0,2,6,4],[1,5,7,3]]", "black", "1, two_sided: true")
                     .yaml(),
-                meanRadiance, expected, 0.002, {.samples = 1024, .most = 16384},
+                meanRadiance, expected, 0.002, {.samples = 256, .most = 16384},
                 mistakes(microfacetAlbedo(std::cos(30 * kDegree), 0.2, 3, roughness),
                          roughConductorAlbedo(std::cos(30 * kDegree), 0.2, 3, std::sqrt(roughness))));
         }
@@ -129,7 +129,7 @@ void roughLimit(Context& context) {
                              meanRadiance,
                              rough ? roughDielectricShares(cosine, 1.5, roughness).reflected
                                    : fresnelDielectric(cosine, 1.5),
-                             0.01, {.samples = 1024, .most = 65536});
+                             0.01, {.samples = 256, .most = 65536});
         }
 }
 

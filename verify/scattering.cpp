@@ -102,7 +102,7 @@ void pdfIntegrates(Context& context) {
             .yaml();
     };
     context.estimate("with light sampling", scene(true), meanRadiance, 1, 0.001,
-                     {.samples = 1024, .most = 16384});
+                     {.samples = 256, .most = 16384});
     context.estimate(
         "without", scene(false), meanRadiance, 1, 0.001, {.samples = 256, .most = 16384},
         {{1 / kPi, "the pdf of a diffuse surface does not integrate to 1: divided by pi twice?"}});

@@ -75,7 +75,7 @@ void airy(Context& context) {
     context.absolute(fmt::format("{} films: the worst difference, {}", asked, where), worst, 0, 2e-4);
     // The films as a camera sees them.
     const auto ratio = [](const std::vector<Film>& f) { return luminance(f[0]) / luminance(f[1]); };
-    const Effort effort{.samples = 4096, .most = 65536};
+    const Effort effort{.samples = 1024, .most = 65536};
     for (const double degrees : {0.0, 60.0})
         for (const auto& [thickness, film] : {std::pair{120.0, 1.4}, std::pair{500.0, 2.2}}) {
             const double cosine = std::cos(degrees * kDegree);
