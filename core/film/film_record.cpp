@@ -4,6 +4,7 @@
 #include "base/byte_hash.h"
 #include "base/error.h"
 #include "base/json_integer.h"
+#include "base/memory_reserve.h"
 #include "base/vec3d.h"
 #include "base/words.h"
 #include "scene/aov.h"
@@ -443,6 +444,8 @@ FilmRecord recordOf(const Scene& scene) {
 }
 
 std::string recordText(const FilmRecord& record) {
+    constexpr std::size_t kMostBytes = std::size_t{1} << 20;  // The text and its tree together.
+    requireMemory(kMostBytes);
     Json json{{"record", kRecordVersion},
               {"title", record.title},
               {"seed", record.seed},

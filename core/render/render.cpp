@@ -3,6 +3,7 @@
 #include "backend/loader.h"
 #include "base/listener.h"
 #include "base/log.h"
+#include "base/memory_reserve.h"
 #include "base/stage.h"
 #include "base/stopwatch.h"
 #include "render/brightest_path.h"
@@ -17,6 +18,14 @@
 
 namespace crt {
 namespace {
+
+/// The packed film, which may be as large as the film itself, and what its writer needs besides.
+std::size_t memoryToWrite(const Film& film) {
+    constexpr std::size_t kWriterBytes = std::size_t{16} << 20;
+    return film.sums.size() * sizeof(double) + film.counts.size() * sizeof(std::uint64_t) +
+           film.primitives.size() * sizeof(std::uint32_t) + film.splats.size() * sizeof(std::uint64_t) +
+           kWriterBytes;
+}
 
 /// An empty film, or what an earlier run of the same scene left; then `identity` names its version too.
 Film openFilm(std::optional<EarlierFilm> there, const CompiledScene& compiled, FilmIdentity& identity) {
@@ -212,6 +221,8 @@ void SceneOnDevices::renderSamples(const SamplingPlan& plan, Watch& watch, const
     sampling.checkpoint_possible = checkpoints.possible;
     SamplingResult result;
     {
+        // To write the film afterwards.
+        const MemoryReserve reserve(memoryToWrite(run.film));
         const WatchedRendering rendering(watch);
         result = sampleFilm(*devices_, run.film, sampling, watch, [&] {
             describeRun(run.identity, facts);

@@ -119,6 +119,47 @@ def can_mount():
     return mounted
 
 
+NOBODY = 65534
+
+
+def become_plain():
+    """Leaves root's rights, if any: limits of processes do not bind root. For the child of a fork."""
+    if os.geteuid() == 0:
+        os.setgroups([])
+        os.setgid(NOBODY)
+        os.setuid(NOBODY)
+
+
+def why_not_plain():
+    """The reason why a user without rights cannot run the program here; empty if that is possible."""
+    try:
+        run = subprocess.run(["test", "-x", CRT, "-a", "-x", FAKE_DIR], preexec_fn=become_plain)
+    except (OSError, subprocess.SubprocessError):
+        return "root may not become another user here"
+    return "" if run.returncode == 0 else "the program is in a folder that other users cannot read"
+
+
+def allow_new_threads(process, allowed):
+    """Lets a running program start threads, or no more. It was started as a plain user."""
+    most, hard = resource.getrlimit(resource.RLIMIT_NPROC)
+
+    def limit():
+        become_plain()
+        resource.prlimit(process.pid, resource.RLIMIT_NPROC, (most if allowed else 1, hard))
+    subprocess.run(["true"], preexec_fn=limit, check=True)
+
+
+def allow_memory(process, more):
+    """Lets a running program map `more` bytes in addition to those that it has. False, and no limit, if
+    it is built with a sanitizer that reserves terabytes of address space."""
+    with open(f"/proc/{process.pid}/statm", encoding="ascii") as file:
+        mapped = int(file.read().split()[0]) * resource.getpagesize()
+    if mapped > 1 << 40:
+        return False
+    resource.prlimit(process.pid, resource.RLIMIT_AS, (mapped + more, mapped + more))
+    return True
+
+
 class CliTest(unittest.TestCase):
     def setUp(self):
         self.directory = tempfile.mkdtemp(prefix="crt-cli-")
@@ -148,12 +189,18 @@ class CliTest(unittest.TestCase):
         self.assertEqual(run.returncode, expect, f"crt {' '.join(arguments)}\n{run.stdout}{run.stderr}")
         return run
 
-    def start(self, *arguments, fault=None, most_descriptors=None, **changes):
+    def start(self, *arguments, fault=None, most_descriptors=None, plain=False, **changes):
+        """Starts crt in the folder of the test; `plain`: as a user who is not root."""
         if fault:
             changes["CRT_FAKE_FAULT"] = fault
+        if plain and os.geteuid() == 0:
+            for name in (self.directory, self.path("scene.yaml")):
+                os.chown(name, NOBODY, NOBODY)
 
         def begin():
             default_signals()
+            if plain:
+                become_plain()
             if most_descriptors:
                 resource.setrlimit(resource.RLIMIT_NOFILE, (most_descriptors, most_descriptors))
 

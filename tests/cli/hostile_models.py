@@ -31,7 +31,7 @@ PLY = (
 
 def with_data(document, data=POSITIONS + INDICES):
     """The document with its buffer inside, as a data: URI."""
-    document = copy.deepcopy(document)
+    document = {**document, "buffers": copy.deepcopy(document["buffers"])}
     document["buffers"][0].setdefault(
         "uri", "data:application/octet-stream;base64," + base64.b64encode(data).decode()
     )

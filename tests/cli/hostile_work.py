@@ -3,12 +3,14 @@ others choose, and values at the edge of their files' formats. All are made here
 
 import json
 import os
+import resource
 import struct
 import zlib
 
 from hostile_models import TRIANGLE, chunk, glb, POSITIONS
 
 HEAD = "crt: 1\nfilm: {resolution: [8, 8]}\nsampler: {samples: 2}\n"
+SPHERE = "materials: {m: {type: mirror, reflectance: 1}}\nobjects: [{sphere: {radius: 1}, material: m}]\n"
 MESH = "mesh: {positions: [[0,0,0],[1,0,0],[0,1,0]], faces: [[0,1,2]]}"
 
 
@@ -69,6 +71,50 @@ def material_cases(case):
     )
 
 
+def black_png(width, height):
+    """Of grey texels, in a thousandth of their bytes."""
+    head = png_part(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0))
+    texels = png_part(b"IDAT", packed_zeros((width + 1) * height))
+    return b"\x89PNG\r\n\x1a\n" + head + texels + png_part(b"IEND", b"")
+
+
+def packed_zeros(count):
+    """A zlib stream (RFC 1950): one block that is packed once, as often as it fits, and the rest."""
+    block = 1 << 20
+    packer = zlib.compressobj(9, zlib.DEFLATED, -15)
+    packed = packer.compress(bytes(block)) + packer.flush(zlib.Z_FULL_FLUSH)
+    rest = packer.compress(bytes(count % block)) + packer.flush()
+    return b"\x78\xda" + packed * (count // block) + rest + struct.pack(">HH", count % 65521, 1)
+
+
+def png_part(kind, data):
+    return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+
+def large_scene_cases(case):
+    def environment(folder):
+        folder.write("scene.yaml", HEAD + f"environment: {{image: sky.png}}\n{SPHERE}")
+        folder.write("sky.png", black_png(16384, 8192))
+
+    def one_line(folder):
+        """As crt.scene(dict) of Python writes scenes: the column of each object is counted in megabytes."""
+        document = {
+            "crt": 1,
+            "title": "x" * 4000000,
+            "film": {"resolution": [8, 8]},
+            "environment": {"radiance": 1},
+            "materials": {"m": {"type": "diffuse", "reflectance": 0.5}},
+            "objects": [{"sphere": {"radius": 1}, "material": "m"}] * 20000,
+        }
+        folder.write("scene.yaml", json.dumps(document))
+
+    render = ["scene.yaml", "-b", "fake", "-o", "a.pfm"]
+    case("scene", "an environment of 16384 x 8192 black texels in 130 kB", render, 3,
+         ("scene.yaml:4:", "sky.png", "CRT_SCENE_MEMORY="), environment,
+         limits={resource.RLIMIT_AS: 4 << 30})  # Written out it takes 7 GB.
+    case("scene", "20,000 objects behind 4 MB in one line", ["info", "scene.yaml"], 0, (), one_line)
+
+
 def model_cases(case):
     def model(asked, document, codes, words=()):
         data = json.dumps(document, separators=(",", ":")).encode()
@@ -85,7 +131,7 @@ def model_cases(case):
         "buffers": [{"byteLength": 36}],
     }
     plain = {"attributes": {"POSITION": 0}}
-    model("100,000 primitives in a mesh", {**document, "meshes": [{"primitives": [plain] * 100000}]}, 0)
+    model("40,000 primitives in a mesh", {**document, "meshes": [{"primitives": [plain] * 40000}]}, 0)
     model(
         "100,000 meshes of points",
         {**document, "meshes": [{"primitives": [{**plain, "mode": 0}]}] * 100000},
@@ -153,16 +199,13 @@ def texture_cases(texture, png):
     whole = png(8, 8)
     data_at = whole.index(b"IDAT") - 4
 
-    def part(kind, data):
-        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-
-    bomb = part(b"IDAT", zlib.compress(b"\0" * (200 << 20), 9))
-    texture("a PNG with 200 MB behind its last row", "a.png", whole[:data_at] + bomb + part(b"IEND", b""),
-            codes=(0, 3))
-    texture("a PNG without texels", "a.png", whole[:data_at] + part(b"IEND", b""), "a.png")
-    text = part(b"zTXt", b"a\0\0" + zlib.compress(b"\0" * (200 << 20), 9))
+    end = png_part(b"IEND", b"")
+    bomb = png_part(b"IDAT", packed_zeros(200 << 20))
+    texture("a PNG with 200 MB behind its last row", "a.png", whole[:data_at] + bomb + end, codes=(0, 3))
+    texture("a PNG without texels", "a.png", whole[:data_at] + end, "a.png")
+    text = png_part(b"zTXt", b"a\0\0" + packed_zeros(200 << 20))
     texture("a PNG with a text of 200 MB", "a.png", whole[:data_at] + text + whole[data_at:], codes=(0, 3))
-    profile = part(b"iCCP", b"a\0\0" + zlib.compress(b"\0" * (200 << 20), 9))
+    profile = png_part(b"iCCP", b"a\0\0" + packed_zeros(200 << 20))
     texture("a PNG with a colour profile of 200 MB", "a.png", whole[:33] + profile + whole[33:], "(ICC) 'a'",
             codes=0)
     texture("a Radiance HDR of primaries without colours", "a.hdr", b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n"

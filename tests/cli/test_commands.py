@@ -119,6 +119,9 @@ class Completion(CliTest):
         self.assertEqual(self.bash("verify", "-o", ""), ["folder"])
         self.assertEqual(self.bash("help", "ref"), ["reference"])
         self.assertEqual(self.bash("data", "cornell/w"), ["cornell/white"])
+        self.assertEqual(self.bash("scene.yaml", "--set", "film.reso"), ["film.resolution="])
+        self.assertIn("camera.position=", self.bash("scene.yaml", "--set", ""))
+        self.assertNotIn("camera.position=", self.bash("develop", "--set", ""))
 
     @unittest.skipUnless(BASH, "no bash")
     def test_bash_takes_the_script(self):

@@ -88,7 +88,6 @@ class KilledAtAnyMoment(CliTest):
         return ""
 
 
-@unittest.skipUnless(can_mount(), "needs root and the right to mount a tmpfs")
 class TwoPrograms(CliTest):
     """Both go on from one film, the slower one to fewer samples."""
 
@@ -115,6 +114,7 @@ class TwoPrograms(CliTest):
         return int(re.search(r"samples +(\d+) per pixel", self.crt("info", film).stdout)[1])
 
 
+@unittest.skipUnless(can_mount(), "needs root and the right to mount a tmpfs")
 class SmallDisk(CliTest):
     """A disk of 192 KiB; the film of 24 x 16 pixels takes 27 KiB, one of 64 x 64 takes 288."""
 
@@ -214,6 +214,72 @@ class SmallDisk(CliTest):
         self.assertIn("Read-only file system", messages)
         self.assertEqual(self.report("a.report.json")["samples"]["per_pixel"], 30)
         self.assertEqual(self.resumed_samples("disk/c.crtfilm", 30), 8)
+
+
+class Shortage(CliTest):
+    """The host runs out of memory or threads while the first sample is rendered. The limit is set while the
+    program is stopped."""
+
+    SAMPLES, COLUMNS, ROWS = 3, 500, 400  # The slow fake sleeps 2 ms in each row.
+    SIZE = ["--set", f"film.resolution=[{COLUMNS},{ROWS}]"]
+    FILM_BYTES = 72 * COLUMNS * ROWS
+
+    def start_within_a_sample(self, **start):
+        """A render that is stopped in its first sample. After each sample a checkpoint is due."""
+        while True:
+            process = self.start(
+                "scene.yaml", "-b", "fake", "-o", "a.pfm", "--spp", str(self.SAMPLES), "--chunk",
+                "1", "--checkpoint", "c.crtfilm", "--checkpoint-every", "1ms", *self.SIZE, fault="slow",
+                **start
+            )
+            self.wait_for_rendering(process)
+            process.send_signal(signal.SIGSTOP)
+            if not glob.glob(self.path("c.crtfilm*")):
+                return process
+            process.kill()  # On a busy machine the sample may be finished by now.
+            process.communicate()
+            for name in glob.glob(self.path("c.crtfilm*")):
+                os.remove(name)
+
+    def go_on(self, process):
+        """Until its end: the exit code, and the messages."""
+        process.send_signal(signal.SIGCONT)
+        _, messages = process.communicate(timeout=harness.PATIENCE_SECONDS)
+        return process.returncode, messages
+
+    def kept_samples(self):
+        return self.resumed_samples("c.crtfilm", self.SAMPLES, *self.SIZE)
+
+    def test_samples_outlive_the_memory(self):
+        # One arena, and blocks that go back to the system at once: the memory left when an allocation
+        # fails does not depend on what was freed before.
+        allocator = {
+            "MALLOC_ARENA_MAX": "1",
+            "MALLOC_MMAP_THRESHOLD_": "65536",
+            "MALLOC_TRIM_THRESHOLD_": "65536",
+        }
+        # Too little to read the film from the device, and to copy it for a checkpoint as well.
+        for part in (0.3, 0.8):
+            with self.subTest(part=part):
+                process = self.start_within_a_sample(**allocator)
+                if not harness.allow_memory(process, int(part * self.FILM_BYTES)):
+                    self.skipTest("no sanitizer runs within a limit of address space")
+                code, messages = self.go_on(process)
+                self.assertEqual(code, 5, messages)
+                self.assertIn("out of memory on the host", messages)
+                self.assertGreater(self.kept_samples(), 0, messages)
+                os.remove(self.path("c.crtfilm"))
+
+    def test_rendering_goes_on_without_new_threads(self):
+        if why := harness.why_not_plain():
+            self.skipTest(why)
+        # LeakSanitizer starts a thread at the end.
+        options = os.environ.get("ASAN_OPTIONS", "") + ":detect_leaks=0"
+        process = self.start_within_a_sample(plain=True, ASAN_OPTIONS=options)
+        harness.allow_new_threads(process, False)
+        code, messages = self.go_on(process)
+        self.assertEqual(code, 0, messages)
+        self.assertEqual(self.kept_samples(), self.SAMPLES)
 
 
 class ReadOnlyDirectory(CliTest):

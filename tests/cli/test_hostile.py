@@ -799,7 +799,7 @@ def texture_cases(samples):
     texture("a PNG of 60000 x 60000 in 100 bytes", "a.png", png(60000, 60000, b"\0" * 1000), "pixels")
     texture("a PNG cut in the middle", "a.png", png(64, 64)[:80], "a.png")
     texture("a PNG whose rows end early", "a.png", png(64, 64, b"\0" * 5000), "a.png")
-    black = png(16384, 16384, b"\0" * (16385 * 16384), color=0)
+    black = hostile_work.black_png(16384, 16384)
     texture("16384 x 16384 black texels in 260 KB", "a.png", black, "CRT_SCENE_MEMORY")
     for cut in (20, len(jpeg) // 2, len(jpeg) - 20):
         texture(f"a JPEG cut after {cut} bytes", "a.jpg", jpeg[:cut], "a.jpg")
@@ -879,7 +879,7 @@ def image_cases(samples):
     image(
         "16384 x 16384 pixels where there are 2 GB of memory",
         "a.png",
-        png(16384, 16384, b"\0" * (16385 * 16384), color=0),
+        hostile_work.black_png(16384, 16384),
         words="half of what is free",
         limits={resource.RLIMIT_AS: 2 << 30},
     )
@@ -1963,6 +1963,7 @@ def main():
         scene_cases()
         hostile_work.material_cases(case)
         hostile_work.light_cases(case)
+        hostile_work.large_scene_cases(case)
         hostile_values.add(case)
         hostile_work.name_cases(case, good, os.path.join(FAKE, "crt_backend_fake.so"))
         mesh_cases()

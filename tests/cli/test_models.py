@@ -233,7 +233,7 @@ class CornellBox(CliTest):
         if BACKEND == "none":
             raise unittest.SkipTest("no backend for this test is built")
 
-    def luminance(self, mtl):
+    def luminance(self, mtl, samples):
         scenes = os.path.join(REPOSITORY, "bench", "scenes", "mtl")
         for name in os.listdir(scenes):
             shutil.copy(os.path.join(scenes, name), self.directory)
@@ -245,7 +245,7 @@ class CornellBox(CliTest):
             "-b",
             BACKEND,
             "--spp",
-            "256",
+            samples,
             "--set",
             "film.color_space=xyz",
             "-o",
@@ -259,7 +259,7 @@ class CornellBox(CliTest):
         return rows[::-1]
 
     def test_luminance_is_that_of_mitsuba_whoever_wrote_the_mtl(self):
-        images = {mtl: self.luminance(mtl) for mtl in ("cornell_original.mtl", "maya.mtl", "sponza.mtl")}
+        image = self.luminance("cornell_original.mtl", "256")
         with open(
             os.path.join(os.path.dirname(__file__), "cornell_box_by_mitsuba.json"), encoding="utf-8"
         ) as file:
@@ -269,7 +269,7 @@ class CornellBox(CliTest):
             x, y, width, height = patch["x_y_width_height"]
             pixels = [
                 value
-                for row in images["cornell_original.mtl"][y : y + height]
+                for row in image[y : y + height]
                 for value in row[x : x + width]
             ]
             # 1 %, and three standard errors of the mean of this image: of 256 samples a pixel, as
@@ -277,8 +277,10 @@ class CornellBox(CliTest):
             noise = statistics.pstdev(pixels) / len(pixels) ** 0.5 if name != "whole image" else 0
             mean = statistics.fmean(pixels)
             self.assertLess(abs(mean - patch["mitsuba_luminance"]), 0.01 * mean + 3 * noise, name)
-        self.assertEqual(images["maya.mtl"], images["cornell_original.mtl"])
-        self.assertEqual(images["sponza.mtl"], images["cornell_original.mtl"])
+        # Materials that are equal give the same bits in every sample.
+        few = self.luminance("cornell_original.mtl", "16")
+        self.assertEqual(self.luminance("maya.mtl", "16"), few)
+        self.assertEqual(self.luminance("sponza.mtl", "16"), few)
 
 
 if __name__ == "__main__":

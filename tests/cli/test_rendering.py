@@ -266,7 +266,8 @@ class Rendering(CliTest):
             self.assertNotIn(library, maps)
 
     def test_progress_on_a_pipe_is_a_line_in_ten_seconds(self):
-        run = self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", "--time", "11s", fault="slow")
+        run = self.crt("scene.yaml", "-b", "fake", "-o", "a.pfm", "--time", "11s", "--chunk", "1",
+                       fault="slow")
         self.assertNotIn("\r", run.stderr)
         self.assertNotIn("\x1b", run.stderr)
         lines = [line for line in run.stderr.splitlines() if re.search(r"\d+ %.*spp.*paths/s.*left", line)]

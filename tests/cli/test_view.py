@@ -3,8 +3,12 @@
 control. tests/view/test_page.py tests the page in a browser.
 
     test_view.py CRT CONFIG_DIR FAKE_PLUGIN_DIR [unittest arguments]
+
+Over 450 lines: one program, seen from its pages.
 """
 
+import os
+import select
 import signal
 import socket
 import struct
@@ -294,6 +298,69 @@ class Access(CliTest):
             view.state()
             self.assertIsNone(view.process.poll())
             view.process.kill()
+
+    def test_it_outlives_a_lack_of_threads(self):
+        if why := harness.why_not_plain():
+            self.skipTest(why)
+        view = View(self, "-b", "fake", plain=True)
+        view.wait_until_done()
+        harness.allow_new_threads(view.process, False)
+        self.begin_requests(view, 1)
+        harness.allow_new_threads(view.process, True)
+        self.wait_for_an_answer(view)
+
+    def test_it_outlives_a_lack_of_memory(self):
+        view = View(self, "-b", "fake")
+        view.wait_until_done()
+        # Less than the stack of a thread. Those of threads that have ended are used again.
+        if not harness.allow_memory(view.process, 1 << 20):
+            self.skipTest("no sanitizer runs within a limit of address space")
+        self.begin_requests(view, 40)
+        self.wait_for_an_answer(view)
+
+    def begin_requests(self, view, count):
+        """Until the server closes one, because it cannot start a thread for it."""
+        begun = [socket.create_connection(("127.0.0.1", view.port), 30) for _ in range(count)]
+        for connection in begun:
+            connection.sendall(b"GET ")
+        closed, _, _ = select.select(begun, [], [], harness.PATIENCE_SECONDS)
+        self.assertTrue(closed)
+        for connection in begun:
+            connection.close()
+
+    def wait_for_an_answer(self, view):
+        """Requests are closed without one until the threads of those before them have ended."""
+        end = time.monotonic() + harness.PATIENCE_SECONDS
+        while True:
+            try:
+                return view.state()
+            except OSError as error:
+                self.assertIsNone(view.process.poll(), error)
+                self.assertLess(time.monotonic(), end)
+                time.sleep(0.02)
+
+    def test_the_token_is_in_no_argument(self):
+        """Every user of the machine can read those of xdg-open and of the browser."""
+        self.write("xdg-open", "#!/bin/sh\nprintf '%s\\n' \"$@\" > part\nmv part arguments\n")
+        os.chmod(self.path("xdg-open"), 0o755)
+        os.mkdir(self.path("run"), 0o700)
+        process = self.start("view", "scene.yaml", "-b", "fake", DISPLAY=":99",
+                             PATH=f"{self.directory}:{os.environ['PATH']}", XDG_RUNTIME_DIR=self.path("run"))
+        address = process.stdout.readline().strip()
+        token = address.split("token=")[1]
+        self.assertIn("the view is in the browser", process.stderr.readline())
+        end = time.monotonic() + harness.PATIENCE_SECONDS
+        while not os.path.exists(self.path("arguments")):
+            self.assertLess(time.monotonic(), end)
+            time.sleep(0.01)
+        arguments = harness.read_bytes(self.path("arguments")).decode().split()
+        self.assertNotIn(token, " ".join(arguments))
+        self.assertEqual(len(arguments), 1)
+        page = arguments[0].removeprefix("file://")
+        # The page leads to the view, and other users cannot read it.
+        self.assertIn(address, harness.read_bytes(page).decode())
+        self.assertEqual(os.stat(os.path.dirname(page)).st_mode & 0o077, 0)
+        self.assertEqual(os.path.dirname(os.path.dirname(page)), self.path("run"))
 
     def threads_of(self, view):
         with open(f"/proc/{view.process.pid}/status", encoding="ascii", errors="replace") as file:

@@ -10,6 +10,7 @@ there first.
 import json
 import os
 import pathlib
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -54,9 +55,9 @@ class CompilerProcess(unittest.TestCase):
     def kernels(self):
         return list(self.cache.glob("*.crtkernel"))
 
-    def warm(self, compiler):
+    def warm(self, compiler, **more):
         environment = dict(os.environ, CRT_FAKE_NVRTC_SECONDS=compiler, CRT_CACHE_DIR=str(self.cache),
-                           LD_LIBRARY_PATH=f"{FAKE_NVRTC}:{FAKE_CUDA}")
+                           LD_LIBRARY_PATH=f"{FAKE_NVRTC}:{FAKE_CUDA}", **more)
         return subprocess.run(
             [CRT, "warm", SCENE, "-b", "cuda"],
             cwd=self.folder,
@@ -111,6 +112,27 @@ class CompilerProcess(unittest.TestCase):
         self.assertIn("told by the fake compiler", run.stderr)
         self.assertRegex(run.stdout, r": precompiled, nothing to compile\n$")
         self.assertEqual(self.kernels(), [])
+
+    def test_a_compiler_that_others_could_have_written_is_not_run(self):
+        plugins, compiler = self.copied_plugin()
+        os.chmod(compiler, 0o777)
+        run = self.warm("0", CRT_BACKEND_PATH=str(plugins))
+        self.assertIn("everyone can write to", run.stderr)
+        self.assertRegex(run.stdout, r": precompiled, nothing to compile\n$")
+        self.assertEqual(self.kernels(), [])
+        os.chmod(compiler, 0o755)
+        run = self.warm("0", CRT_BACKEND_PATH=str(plugins))
+        self.assertRegex(run.stdout, r"NVRTC 13.0 sm_90, compiled in \d+\.\d s\n$", run.stderr)
+
+    def copied_plugin(self):
+        """The folder of a copy of the CUDA plugin, and the copy of the program that compiles for it."""
+        folder = self.folder / "backends"
+        folder.mkdir()
+        folder.chmod(0o755)
+        for name in ("crt_backend_cuda.so", "crt_nvrtc"):
+            shutil.copy(pathlib.Path(CRT).resolve().parent.parent / "lib/crt" / name, folder)
+            (folder / name).chmod(0o755)
+        return folder, folder / "crt_nvrtc"
 
     def test_without_a_cache_nothing_is_left_behind(self):
         _, backend = self.render("100", "--spp", "1", "--no-cache")
