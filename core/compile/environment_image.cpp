@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <numbers>
@@ -126,12 +127,39 @@ EnvironmentTexels texelsOf(const EnvironmentImage& image) {
     return out;
 }
 
-/// The direction of the middle of a texel.
-Vec3d directionOf(const Axes& axes, double row, double column, std::size_t rows) {
-    const double theta = row * kPi / static_cast<double>(rows),
-                 phi = (column / static_cast<double>(rows) - 1) * kPi;
-    return axes.right * (std::sin(theta) * std::sin(phi)) + axes.up * std::cos(theta) +
-           axes.ahead * (std::sin(theta) * std::cos(phi));
+struct SineCosine {
+    double sine, cosine;
+};
+
+SineCosine sineCosine(double angle) { return {std::sin(angle), std::cos(angle)}; }
+
+/// The luminance of each texel over that of the zenith: a mean of four points, as the gradation is steep
+/// at the horizon and the indicatrix at the sun.
+std::vector<double> relativeLuminances(const CieSky& sky, std::size_t rows) {
+    constexpr std::array kPoints{0.5 - 0.28867513459481287, 0.5 + 0.28867513459481287};
+    const std::size_t columns = 2 * rows;
+    std::vector<SineCosine> azimuths;
+    for (std::size_t column = 0; column < columns; ++column)
+        for (const double x : kPoints)
+            azimuths.push_back(
+                sineCosine(((static_cast<double>(column) + x) / static_cast<double>(rows) - 1) * kPi));
+    const CieSkyLuminance luminance(sky.type, sky.towards_sun, sky.axes.up);
+    std::vector<double> relative(rows * columns);
+    const auto row_of_texels = [&](std::size_t row) {
+        for (const double y : kPoints) {
+            const SineCosine zenith =
+                sineCosine((static_cast<double>(row) + y) * kPi / static_cast<double>(rows));
+            for (std::size_t i = 0; i < azimuths.size(); ++i)
+                relative[row * columns + i / 2] += luminance(
+                    sky.axes.right * (zenith.sine * azimuths[i].sine) + sky.axes.up * zenith.cosine +
+                    sky.axes.ahead * (zenith.sine * azimuths[i].cosine));
+        }
+        for (std::size_t i = row * columns; i < (row + 1) * columns; ++i) relative[i] /= 4;
+    };
+    parallelFor(rows, 16, [&](std::size_t first, std::size_t end) {
+        for (std::size_t row = first; row < end; ++row) row_of_texels(row);
+    });
+    return relative;
 }
 
 EnvironmentTexels texelsOf(const CieSky& sky, const Spectrum& unit) {
@@ -142,27 +170,15 @@ EnvironmentTexels texelsOf(const CieSky& sky, const Spectrum& unit) {
     out.texels.resize(count);
     out.brightness.resize(count);
     const Vec3d xyz = spectrumToXyz(unit);
-    // A mean of four points: the gradation is steep at the horizon, the indicatrix at the sun.
-    constexpr double kNear = 0.5 - 0.28867513459481287, kFar = 0.5 + 0.28867513459481287;
+    const std::vector<double> relative = relativeLuminances(sky, out.height);
     double horizontal = 0;  // ∫ cos over the upper half, of the relative luminance.
-    std::vector<double> relative(count);
-    for (std::size_t row = 0; row < out.height; ++row)
-        for (std::size_t column = 0; column < out.width; ++column) {
-            double sum = 0;
-            for (const double y : {kNear, kFar})
-                for (const double x : {kNear, kFar})
-                    sum += cieSkyLuminance(sky.type,
-                                           directionOf(sky.axes, static_cast<double>(row) + y,
-                                                       static_cast<double>(column) + x, out.height),
-                                           sky.towards_sun, sky.axes.up);
-            const std::size_t i = row * out.width + column;
-            relative[i] = sum / 4;
-            const double upper = kPi * static_cast<double>(row) / out.height,
-                         lower = kPi * static_cast<double>(row + 1) / out.height;
-            if (relative[i] > 0)
-                horizontal += relative[i] * (2 * kPi / out.width) *
-                              (std::pow(std::sin(lower), 2) - std::pow(std::sin(upper), 2)) / 2;
-        }
+    for (std::size_t row = 0; row < out.height; ++row) {
+        const double upper = kPi * static_cast<double>(row) / out.height,
+                     lower = kPi * static_cast<double>(row + 1) / out.height;
+        const double squares = std::pow(std::sin(lower), 2) - std::pow(std::sin(upper), 2);
+        for (std::size_t column = 0; column < out.width; ++column)
+            horizontal += relative[row * out.width + column] * (2 * kPi / out.width) * squares / 2;
+    }
     const double scale = sky.horizontal ? sky.amount / horizontal : sky.amount;
     for (std::size_t i = 0; i < count; ++i) {
         // Coefficients of 0 are the constant ½.

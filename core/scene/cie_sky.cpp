@@ -9,11 +9,7 @@
 namespace crt {
 namespace {
 
-/// Table 1 of the standard: a and b of the gradation, c, d and e of the indicatrix.
-struct Parameters {
-    double a, b, c, d, e;
-};
-constexpr std::array<Parameters, kCieSkyTypes> kTypes{{
+constexpr std::array<CieSkyParameters, kCieSkyTypes> kTypes{{
     {4.0, -0.70, 0, -1.0, 0.00},
     {4.0, -0.70, 2, -1.5, 0.15},
     {1.1, -0.80, 0, -1.0, 0.00},
@@ -32,29 +28,32 @@ constexpr std::array<Parameters, kCieSkyTypes> kTypes{{
 }};
 
 /// Brighter or darker towards the horizon.
-double gradation(const Parameters& p, double cosine) {
+double gradation(const CieSkyParameters& p, double cosine) {
     return cosine > 0 ? 1 + p.a * std::exp(p.b / cosine) : 1;
 }
 
 /// Scattering of the sky at an angle with the sun.
-double indicatrix(const Parameters& p, double angle) {
+double indicatrix(const CieSkyParameters& p, double angle) {
     const double cosine = std::cos(angle);
     return 1 + p.c * (std::exp(p.d * angle) - std::exp(p.d * std::numbers::pi / 2)) + p.e * cosine * cosine;
 }
 
+/// Between unit vectors of this dot product, in radians.
+double angle(double cosine) { return std::acos(std::clamp(cosine, -1.0, 1.0)); }
+
 }  // namespace
 
-double cieSkyLuminance(int type, double zenith_angle, double sun_zenith_angle, double from_sun) {
-    const Parameters& p = kTypes[static_cast<std::size_t>(type - 1)];
-    return indicatrix(p, from_sun) * gradation(p, std::cos(zenith_angle)) /
-           (indicatrix(p, sun_zenith_angle) * gradation(p, 1));
-}
+CieSkyLuminance::CieSkyLuminance(int type, const Vec3d& sun, const Vec3d& zenith)
+    : parameters_(kTypes[static_cast<std::size_t>(type - 1)]),
+      sun_(sun),
+      zenith_(zenith),
+      of_zenith_(indicatrix(parameters_, angle(dot(sun, zenith))) * gradation(parameters_, 1)) {}
 
-double cieSkyLuminance(int type, const Vec3d& towards, const Vec3d& sun, const Vec3d& zenith) {
-    const double cosine = dot(towards, zenith);
+double CieSkyLuminance::operator()(const Vec3d& towards) const {
+    const double cosine = dot(towards, zenith_);
     if (!(cosine > 0)) return 0;
-    const auto angle = [](double c) { return std::acos(std::clamp(c, -1.0, 1.0)); };
-    return cieSkyLuminance(type, angle(cosine), angle(dot(sun, zenith)), angle(dot(towards, sun)));
+    return indicatrix(parameters_, angle(dot(towards, sun_))) *
+           gradation(parameters_, std::cos(angle(cosine))) / of_zenith_;
 }
 
 }  // namespace crt

@@ -5,13 +5,24 @@
 
 namespace crt {
 
-/// Luminance over that of the zenith, for sky type 1 to 15: 1 is overcast, 5 uniform, 12 clear. Angles in
-/// radians: of the direction and of the sun with the zenith, and of the direction with the sun. Above the
-/// horizon.
-double cieSkyLuminance(int type, double zenith_angle, double sun_zenith_angle, double from_sun);
+/// Table 1 of the standard: a and b of the gradation, c, d and e of the indicatrix.
+struct CieSkyParameters {
+    double a, b, c, d, e;
+};
 
-/// The same of unit vectors; 0 below the horizon.
-double cieSkyLuminance(int type, const Vec3d& towards, const Vec3d& sun, const Vec3d& zenith);
+/// A sky of type 1 to 15 (1 is overcast, 5 uniform, 12 clear) under a sun. Takes unit vectors.
+class CieSkyLuminance {
+public:
+    CieSkyLuminance(int type, const Vec3d& sun, const Vec3d& zenith);
+
+    /// Luminance towards a unit vector over that of the zenith; 0 below the horizon.
+    double operator()(const Vec3d& towards) const;
+
+private:
+    CieSkyParameters parameters_;
+    Vec3d sun_, zenith_;
+    double of_zenith_;  ///< The product of gradation and indicatrix at the zenith.
+};
 
 inline constexpr int kCieSkyTypes = 15;
 
