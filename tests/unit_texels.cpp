@@ -14,6 +14,7 @@
 #include <cmath>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
 #include <functional>
 
 using namespace crt;
@@ -125,6 +126,51 @@ TEST_CASE("texels of an EXR lie where its data window lies in the picture", "[te
                           (inside ? rgb[static_cast<std::size_t>((row * 3 + column) * 3 + c)] : 0));
                 }
     }
+}
+
+namespace {
+
+/// The beginning of an EXR of as many channels of halves as asked for, and zeros in place of its pixels.
+std::string exrOf(int channels, std::int32_t width, std::int32_t height, std::size_t bytes) {
+    const auto number = [](auto value) {
+        return std::string(reinterpret_cast<const char*>(&value), sizeof value);
+    };
+    std::string text = number(std::int32_t{20000630}) + number(std::int32_t{2});
+    const auto attribute = [&](const char* name, const char* type, const std::string& value) {
+        text += name + std::string(1, '\0') + type + std::string(1, '\0') +
+                number(static_cast<std::int32_t>(value.size())) + value;
+    };
+    std::string list;
+    for (int i = 0; i < channels; ++i) {
+        const std::string name = i < 3 ? std::string(1, "RGB"[i]) : "c" + std::to_string(10000 + i);
+        list += name + std::string(1, '\0') + number(std::int32_t{1}) + std::string(4, '\0') +
+                number(std::int32_t{1}) + number(std::int32_t{1});
+    }
+    const std::string window = std::string(8, '\0') + number(width - 1) + number(height - 1);
+    attribute("channels", "chlist", list + std::string(1, '\0'));
+    attribute("compression", "compression", "\3");
+    attribute("dataWindow", "box2i", window);
+    attribute("displayWindow", "box2i", window);
+    attribute("lineOrder", "lineOrder", std::string(1, '\0'));
+    attribute("pixelAspectRatio", "float", number(1.0f));
+    attribute("screenWindowCenter", "v2f", std::string(8, '\0'));
+    attribute("screenWindowWidth", "float", number(1.0f));
+    return text + std::string(bytes, '\0');
+}
+
+}  // namespace
+
+TEST_CASE("an EXR of far more channels than a texture has is refused before they are decoded", "[texels]") {
+    const TemporaryFolder folder;
+    const std::string name = folder / "many.exr";
+    const auto refused = [&](int channels, std::int32_t width) {
+        std::ofstream(name, std::ios::binary) << exrOf(channels, width, 1024, 200000);
+        return refusal([&] { (void)texelsInfo(name); });
+    };
+    CHECK_THAT(refused(1000, 2048), Contains("it has 1000 channels") && Contains("a separate file"));
+    // Fewer channels, or fewer pixels.
+    CHECK(refused(190, 2048) == "nothing was refused");
+    CHECK(refused(1000, 256) == "nothing was refused");
 }
 
 TEST_CASE("a display window that no pixels pay for is refused", "[texels]") {

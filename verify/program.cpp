@@ -118,6 +118,20 @@ private:
     std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
+/// The time that each level takes, as in `crt verify --help`.
+constexpr std::array<const char*, 3> kTimes{"a minute or so", "a quarter of an hour", "hours"};
+
+/// A line where cases were asked for by name that are of a slower level than --level; else nothing.
+std::string slowCasesText(const std::vector<const Case*>& cases, Level asked) {
+    Level slowest = asked;
+    for (const Case* const c : cases) slowest = std::max(slowest, c->level);
+    if (slowest == asked) return "";
+    return fmt::format("level {}, which takes {} in all: {} of these\n", name(slowest),
+                       kTimes[static_cast<std::size_t>(slowest)],
+                       std::count_if(cases.begin(), cases.end(),
+                                     [&](const Case* c) { return c->level == slowest; }));
+}
+
 void writeWhole(const std::filesystem::path& path, const std::string& text) {
     AtomicFile file(path.string());
     file.write(text.data(), text.size());
@@ -156,6 +170,7 @@ int run(const Arguments& arguments) {
     // Cases warn about scenes that are odd on purpose.
     setLogLevel(LogLevel::Error);
 
+    if (!arguments.quiet) printOut("{}", slowCasesText(cases, arguments.level));
     SignalWatch watch;
     Line line(cases.size(), arguments.quiet);
     const bool colored = isatty(STDOUT_FILENO) != 0 && std::getenv("NO_COLOR") == nullptr;

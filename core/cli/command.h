@@ -19,6 +19,7 @@ struct Completion {
         Backend,  ///< The names that `crt plugins` lists.
         Data,     ///< The names that `crt data` lists.
         Command,
+        Setting,  ///< One of `words`, which end with '=': the value follows without a space.
     };
     Kind kind = Kind::None;
     std::vector<std::string> words{};

@@ -50,7 +50,8 @@ std::vector<std::string> commandNames(const std::vector<Command>& commands) {
 /// Words to choose from, for the kinds that have any.
 std::vector<std::string> wordsOf(const Completion& completion, const std::vector<Command>& commands) {
     switch (completion.kind) {
-        case Completion::Kind::Word: return completion.words;
+        case Completion::Kind::Word:
+        case Completion::Kind::Setting: return completion.words;
         case Completion::Kind::Backend: return backendNames();
         case Completion::Kind::Command: return commandNames(commands);
         default: return {};
@@ -68,6 +69,9 @@ std::string bashValue(const Completion& completion, const std::vector<Command>& 
         case Completion::Kind::File: return fmt::format("_crt_files {}", fmt::join(completion.words, " "));
         case Completion::Kind::Folder: return "_crt_folders";
         case Completion::Kind::Data: return fmt::format("_crt_words $({})", kListData);
+        case Completion::Kind::Setting:
+            return fmt::format("compopt -o nospace 2>/dev/null; _crt_words {}",
+                               fmt::join(completion.words, " "));
         default: return fmt::format("_crt_words {}", fmt::join(wordsOf(completion, commands), " "));
     }
 }
@@ -142,6 +146,8 @@ std::string zshAction(const Completion& completion, const std::vector<Command>& 
             return completion.words.empty()
                        ? "_files"
                        : fmt::format("_files -g \"*.({})(-.)\"", fmt::join(completion.words, "|"));
+        case Completion::Kind::Setting:
+            return fmt::format("{{compadd -S \"\" - {}}}", fmt::join(completion.words, " "));
         default: return fmt::format("({})", fmt::join(wordsOf(completion, commands), " "));
     }
 }

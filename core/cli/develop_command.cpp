@@ -256,6 +256,7 @@ Command developCommand() {
                       .placeholder = "KEY=VALUE",
                       .help = "change a development setting, e.g. film.exposure_ev=1; repeatable",
                       .read = [to](const std::string& text) { to->changes.push_back(parseOverride(text)); },
+                      .completion = completeSetting({"film"}),
                       .repeatable = true},
                      exposeOption(to->expose_automatically),
                      {.names = "--crop",

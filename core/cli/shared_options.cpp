@@ -3,8 +3,12 @@
 #include "base/error.h"
 #include "base/log.h"
 #include "cli/arguments.h"
+#include "scene/yaml/scene_schema.h"
 
 #include <fmt/format.h>
+
+#include <algorithm>
+#include <set>
 
 namespace crt {
 
@@ -14,12 +18,30 @@ unsigned smallCount(const std::string& text, const char* option, std::uint64_t l
     return static_cast<unsigned>(n);
 }
 
+Completion completeSetting(const std::vector<std::string>& sections) {
+    std::set<std::string> settings;
+    const auto add = [&](const SectionSchema& section, const std::string& before) {
+        for (const KeySchema& key : section.keys)
+            if (key.kind != ValueKind::Section) settings.insert(before + key.name + "=");
+    };
+    for (const KeySchema& key : schemaSection("").keys) {
+        const bool is_map = key.kind == ValueKind::Section && key.shape == ValueShape::One;
+        const bool is_wanted =
+            sections.empty() || std::find(sections.begin(), sections.end(), key.name) != sections.end();
+        if (!is_map || !is_wanted) continue;
+        for (const SectionSchema* const section : schemaVariants(key.section))
+            add(*section, key.name + ".");
+    }
+    return {Completion::Kind::Setting, {settings.begin(), settings.end()}};
+}
+
 void addSceneChanges(OptionGroup& group, SceneRequest& scene) {
     group.options.push_back(
         {.names = "--set",
          .placeholder = "KEY=VALUE",
          .help = "change the scene, e.g. film.resolution=[256,256]; repeatable",
          .read = [&scene](const std::string& text) { scene.overrides.push_back(parseOverride(text)); },
+         .completion = completeSetting(),
          .repeatable = true});
     group.options.push_back(
         {.names = "--seed",

@@ -9,11 +9,15 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 namespace crt {
 
 /// A count that no use has above 65,536. Throws crt::Error(Usage).
 unsigned smallCount(const std::string& text, const char* option, std::uint64_t least);
+
+/// The keys of these sections of a scene, or of all its sections, as --set takes them.
+Completion completeSetting(const std::vector<std::string>& sections = {});
 
 /// --set, --seed and --crop. The references, here and below, must live as long as the command.
 void addSceneChanges(OptionGroup& group, SceneRequest& scene);

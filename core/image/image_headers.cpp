@@ -295,4 +295,15 @@ void checkRows(std::uint64_t width, std::uint64_t height, std::uint64_t bytes_a_
         throw DamagedHeader(fmt::format("its rows of {} pixels are longer than can be read", width));
 }
 
+void checkChannels(std::uint64_t pixels, std::uint64_t bytes_a_pixel, std::uint64_t channels,
+                   std::uint64_t bytes_read_a_pixel) {
+    constexpr std::uint64_t kMostTimes = 64, kAlwaysBytes = std::uint64_t{1} << 30;
+    if (bytes_a_pixel > kMostTimes * bytes_read_a_pixel && bytes_a_pixel * pixels > kAlwaysBytes)
+        throw DamagedHeader(
+            fmt::format("it has {} channels, and all of them are decoded to read some; above {} GiB of "
+                        "pixels it may hold {} times what is read; write the channels that are needed into "
+                        "a separate file",
+                        channels, kAlwaysBytes >> 30, kMostTimes));
+}
+
 }  // namespace crt::image

@@ -32,4 +32,8 @@ inline constexpr std::uint64_t kStripRows = 64;
 /// Throws DamagedHeader if this number of rows would take more than a gigabyte, and more than the image.
 void checkRows(std::uint64_t width, std::uint64_t height, std::uint64_t bytes_a_pixel);
 
+/// Throws DamagedHeader if a file holds far more channels than are read: OpenEXR decodes all of them.
+void checkChannels(std::uint64_t pixels, std::uint64_t bytes_a_pixel, std::uint64_t channels,
+                   std::uint64_t bytes_read_a_pixel);
+
 }  // namespace crt::image

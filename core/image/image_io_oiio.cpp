@@ -574,6 +574,9 @@ void readPartOf(ImageInput& input, const ImageSpec& spec, Part part, const char*
                           : info.type == CRT_TEXELS_UINT16 ? TypeDesc(TypeDesc::UINT16)
                                                            : TypeDesc(TypeDesc::FLOAT);
     const std::size_t pixel = channels.size() * type.size();
+    if (!channels.empty())
+        crt::image::checkChannels(width * height, spec.pixel_bytes(true),
+                                  static_cast<std::uint64_t>(spec.nchannels), pixel);
     if (to.data == nullptr) return;
 
     if (std::uint64_t{info.width} * info.height * pixel != to.bytes)

@@ -3,6 +3,7 @@
 #include "base/error.h"
 #include "base/log.h"
 #include "base/parallel.h"
+#include "base/unit_text.h"
 
 #include <fmt/format.h>
 
@@ -108,8 +109,8 @@ void tellClipped(const std::string& path, const Image& image, const EncodedImage
     const double share =
         static_cast<double>(encoded.clipped_values) / static_cast<double>(encoded.rgb.size());
     const std::string clipped = fmt::format(
-        "'{}': {:.2g} % of the colour values lie outside what 8 bits can show and were clipped", path,
-        100.0 * share);
+        "'{}': {} of the colour values lie outside what 8 bits can show and were clipped", path,
+        percentText(share));
     // Above white are no more pixels than clipped values.
     const double stops = 3 * share > 0.1 ? stopsTooBright(image) : 0;
     if (stops > 0)
