@@ -170,7 +170,10 @@ int run(const Arguments& arguments) {
     // Cases warn about scenes that are odd on purpose.
     setLogLevel(LogLevel::Error);
 
-    if (!arguments.quiet) printOut("{}", slowCasesText(cases, arguments.level));
+    if (!arguments.quiet) {
+        printOut("{}", slowCasesText(cases, arguments.level));
+        flushStandardOutput();
+    }
     SignalWatch watch;
     Line line(cases.size(), arguments.quiet);
     const bool colored = isatty(STDOUT_FILENO) != 0 && std::getenv("NO_COLOR") == nullptr;

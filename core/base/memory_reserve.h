@@ -7,9 +7,9 @@
 
 namespace crt {
 
-/// Holds address space back while it lives, so that the code afterwards has that much even if the work before
-/// used up all that a limit allows. The pages are not touched and take no memory. Holds nothing if there is no
-/// room.
+/// Holds address space back while it lives, so that the code afterwards has that much even if the work
+/// before used up all that a limit allows. The pages are not touched and take no memory. Holds nothing if
+/// there is no room.
 class MemoryReserve {
 public:
     explicit MemoryReserve(std::size_t bytes) : held_(new (std::nothrow) std::byte[bytes]) {}

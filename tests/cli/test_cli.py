@@ -242,6 +242,15 @@ class Info(CliTest):
 
 
 class Verify(CliTest):
+    def test_a_case_of_a_slower_level_is_announced(self):
+        verify = self.start("verify", "-b", "example", "--case", "energy-balance")
+        try:
+            self.assertIn("level merge, which takes a quarter of an hour in all: 1 of these",
+                          verify.stdout.readline())
+        finally:
+            verify.kill()
+            verify.communicate()
+
     def test_wrong_physics_is_named(self):
         run = self.crt("verify", "-b", "without_cosine", "--case", "square-light", "-o", "out", expect=7)
         self.assertIn("one of the two cosines is missing", run.stdout)
