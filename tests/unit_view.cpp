@@ -276,6 +276,20 @@ TEST_CASE("a changed, a new and a lost file are noticed, and what changed while 
     CHECK(times.changed());
 }
 
+TEST_CASE("a file that may have changed after it was read, before its first look, counts as changed",
+          "[view]") {
+    const crt::TemporaryFolder folder;
+    const std::string scene = folder.write("scene", "one"), mesh = folder.write("mesh", "two");
+    const auto began = crt::FileTimes::Time::clock::now();
+    const crt::FileTimes before({scene});
+    const auto changedAt = [&](std::chrono::milliseconds after) {
+        std::filesystem::last_write_time(mesh, began + after);
+        return crt::FileTimes({scene, mesh}, before, began).changed();
+    };
+    CHECK(changedAt(std::chrono::milliseconds{5}));
+    CHECK_FALSE(changedAt(std::chrono::milliseconds{-100}));
+}
+
 TEST_CASE("the files of a message are those before its places", "[view]") {
     const std::string message =
         "room/box.yaml:3:7: error: there is no key 'x'\n  x: 1\n  ^\nC:/a:b.obj:12: error: bad\n"

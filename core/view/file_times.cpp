@@ -1,6 +1,8 @@
 #include "view/file_times.h"
 
 #include <algorithm>
+#include <chrono>
+#include <limits>
 #include <system_error>
 
 namespace crt {
@@ -15,10 +17,15 @@ std::optional<FileTimes::State> FileTimes::stateOf(const std::string& file) {
     return state;
 }
 
-FileTimes::FileTimes(const std::vector<std::string>& files, const FileTimes& earlier) {
+FileTimes::FileTimes(const std::vector<std::string>& files, const FileTimes& earlier, Time began) {
+    // File systems stamp files with a clock that lags behind, by a hundredth of a second at most.
+    constexpr std::chrono::milliseconds kLag{20};
+    constexpr std::uintmax_t kUnknown = std::numeric_limits<std::uintmax_t>::max();
     for (const std::string& file : files) {
         const auto found = earlier.noted_.find(file);
-        noted_[file] = found != earlier.noted_.end() ? found->second : stateOf(file);
+        std::optional<State>& state = noted_[file];
+        state = found != earlier.noted_.end() ? found->second : stateOf(file);
+        if (found == earlier.noted_.end() && state && state->time + kLag >= began) state->bytes = kUnknown;
     }
 }
 

@@ -40,8 +40,9 @@ void SceneSource::run() {
     std::unique_lock lock(mutex_);
     while (!stopping_) {
         lock.unlock();
+        const auto began = FileTimes::Time::clock::now();
         read(files);
-        times = FileTimes(files, times);
+        times = FileTimes(files, times, began);
         lock.lock();
         while (!stopping_ && !times.changed()) stopped_.wait_for(lock, kBetweenLooks);
         // An editor may be writing still.
