@@ -165,7 +165,7 @@ void Film::add(const Film& other) {
         for (std::size_t i = first; i < end; ++i) counts[i] += other.counts[i];
         const std::size_t words = shape_.splatWords();
         for (std::size_t i = first; i < end; ++i)
-            addSplats(&splats[i * words], &other.splats[i * words], words);
+            addSplats(splats.data() + i * words, other.splats.data() + i * words, words);
     });
     // The lower first sample wins, so that the id plane does not depend on who is added to whom.
     const auto& mine = samples.ranges();
