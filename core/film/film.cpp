@@ -124,6 +124,12 @@ std::string SampleRanges::text() const {
     return text;
 }
 
+std::uint64_t FilmShape::bytes() const {
+    const std::uint64_t of_primitive = (aovs & kAovPrimitive) != 0 ? 4 : 0;
+    return std::uint64_t{width} * height *
+           (16 * std::uint64_t{channels} + 8 + 8 * std::uint64_t{splatWords()} + of_primitive);
+}
+
 Film::Film(FilmShape shape) : shape_(shape) {
     if (!hasRightChannels(shape))
         throw Error(ErrorKind::Internal, fmt::format("a film with AOV mask {:#x} cannot have {} channels",
@@ -131,8 +137,7 @@ Film::Film(FilmShape shape) : shape_(shape) {
     const std::size_t pixels = std::size_t{shape.width} * shape.height;
     // Said beforehand: a system that promises memory which it does not have would end the process in the
     // middle.
-    const std::uint64_t bytes =
-        std::uint64_t{pixels} * (16 * std::uint64_t{shape.channels} + 8 + 8 * shape.splatWords());
+    const std::uint64_t bytes = shape.bytes();
     constexpr std::uint64_t kWorthAsking = std::uint64_t{1} << 28;
     if (bytes > kWorthAsking && bytes > availableHostMemory())
         throw Error(ErrorKind::Device,

@@ -53,6 +53,8 @@ struct FilmShape {
     std::uint32_t firstSpectral() const { return channels - spectral; }
     /// Words of a pixel in the plane of splats (kernel/dialect/channels.h); 0: the film takes none.
     std::uint32_t splatWords() const;
+    /// Memory of the film's planes.
+    std::uint64_t bytes() const;
     bool operator==(const FilmShape&) const = default;
 };
 

@@ -19,13 +19,8 @@
 namespace crt {
 namespace {
 
-/// The packed film, which may be as large as the film itself, and what its writer needs besides.
-std::size_t memoryToWrite(const Film& film) {
-    constexpr std::size_t kWriterBytes = std::size_t{16} << 20;
-    return film.sums.size() * sizeof(double) + film.counts.size() * sizeof(std::uint64_t) +
-           film.primitives.size() * sizeof(std::uint32_t) + film.splats.size() * sizeof(std::uint64_t) +
-           kWriterBytes;
-}
+/// Memory for a film's writer, besides the packed film, which may be as large as the film itself.
+constexpr std::size_t kWriterBytes = std::size_t{16} << 20;
 
 /// An empty film, or what an earlier run of the same scene left; then `identity` names its version too.
 Film openFilm(std::optional<EarlierFilm> there, const CompiledScene& compiled, FilmIdentity& identity) {
@@ -222,7 +217,7 @@ void SceneOnDevices::renderSamples(const SamplingPlan& plan, Watch& watch, const
     SamplingResult result;
     {
         // To write the film afterwards.
-        const MemoryReserve reserve(memoryToWrite(run.film));
+        const MemoryReserve reserve(run.film.shape().bytes() + kWriterBytes);
         const WatchedRendering rendering(watch);
         result = sampleFilm(*devices_, run.film, sampling, watch, [&] {
             describeRun(run.identity, facts);

@@ -119,32 +119,32 @@ def can_mount():
     return mounted
 
 
-NOBODY = 65534
+UNPRIVILEGED_ID = 65534
 
 
-def become_plain():
+def drop_root():
     """Leaves root's rights, if any: limits of processes do not bind root. For the child of a fork."""
     if os.geteuid() == 0:
         os.setgroups([])
-        os.setgid(NOBODY)
-        os.setuid(NOBODY)
+        os.setgid(UNPRIVILEGED_ID)
+        os.setuid(UNPRIVILEGED_ID)
 
 
-def why_not_plain():
-    """The reason why a user without rights cannot run the program here; empty if that is possible."""
+def why_root_must_stay():
+    """The reason why only root can run the program here; empty if other users can."""
     try:
-        run = subprocess.run(["test", "-x", CRT, "-a", "-x", FAKE_DIR], preexec_fn=become_plain)
+        run = subprocess.run(["test", "-x", CRT, "-a", "-x", FAKE_DIR], preexec_fn=drop_root)
     except (OSError, subprocess.SubprocessError):
         return "root may not become another user here"
     return "" if run.returncode == 0 else "the program is in a folder that other users cannot read"
 
 
 def allow_new_threads(process, allowed):
-    """Lets a running program start threads, or no more. It was started as a plain user."""
+    """Lets a running program start threads, or no more. It was started without root's rights."""
     most, hard = resource.getrlimit(resource.RLIMIT_NPROC)
 
     def limit():
-        become_plain()
+        drop_root()
         resource.prlimit(process.pid, resource.RLIMIT_NPROC, (most if allowed else 1, hard))
     subprocess.run(["true"], preexec_fn=limit, check=True)
 
@@ -189,18 +189,18 @@ class CliTest(unittest.TestCase):
         self.assertEqual(run.returncode, expect, f"crt {' '.join(arguments)}\n{run.stdout}{run.stderr}")
         return run
 
-    def start(self, *arguments, fault=None, most_descriptors=None, plain=False, **changes):
-        """Starts crt in the folder of the test; `plain`: as a user who is not root."""
+    def start(self, *arguments, fault=None, most_descriptors=None, without_root=False, **changes):
+        """Starts crt in the folder of the test; `without_root`: as a user who is not root."""
         if fault:
             changes["CRT_FAKE_FAULT"] = fault
-        if plain and os.geteuid() == 0:
+        if without_root and os.geteuid() == 0:
             for name in (self.directory, self.path("scene.yaml")):
-                os.chown(name, NOBODY, NOBODY)
+                os.chown(name, UNPRIVILEGED_ID, UNPRIVILEGED_ID)
 
         def begin():
             default_signals()
-            if plain:
-                become_plain()
+            if without_root:
+                drop_root()
             if most_descriptors:
                 resource.setrlimit(resource.RLIMIT_NOFILE, (most_descriptors, most_descriptors))
 

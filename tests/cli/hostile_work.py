@@ -131,7 +131,7 @@ def model_cases(case):
         "buffers": [{"byteLength": 36}],
     }
     plain = {"attributes": {"POSITION": 0}}
-    model("40,000 primitives in a mesh", {**document, "meshes": [{"primitives": [plain] * 40000}]}, 0)
+    model("100,000 primitives in a mesh", {**document, "meshes": [{"primitives": [plain] * 100000}]}, 0)
     model(
         "100,000 meshes of points",
         {**document, "meshes": [{"primitives": [{**plain, "mode": 0}]}] * 100000},

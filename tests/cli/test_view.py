@@ -264,7 +264,7 @@ class Access(CliTest):
         self.assertEqual([a for a in listening if a.endswith(f":{view.port:04X}")],
                          [f"0100007F:{view.port:04X}"])
 
-    def test_garbage_and_silence_disturb_nobody(self):
+    def test_garbage_and_silence_do_no_harm(self):
         view = View(self, "-b", "fake")
         silent = [socket.create_connection(("127.0.0.1", view.port)) for _ in range(8)]
         for text in (b"\0\1\2\r\n\r\n", b"GET / HTTP/9.9\r\n\r\n", b"POST /change HTTP/1.1\r\nHost: x\r\n"
@@ -278,7 +278,7 @@ class Access(CliTest):
         for connection in silent:
             connection.close()
 
-    def test_silent_connections_lock_nobody_out(self):
+    def test_silent_connections_do_not_lock_users_out(self):
         """Requests with the token are answered during the run, and not after its end."""
         for limit, most in ((None, 256), (64, 8)):
             view = View(self, "-b", "fake", most_descriptors=limit)
@@ -300,9 +300,9 @@ class Access(CliTest):
             view.process.kill()
 
     def test_it_outlives_a_lack_of_threads(self):
-        if why := harness.why_not_plain():
+        if why := harness.why_root_must_stay():
             self.skipTest(why)
-        view = View(self, "-b", "fake", plain=True)
+        view = View(self, "-b", "fake", without_root=True)
         view.wait_until_done()
         harness.allow_new_threads(view.process, False)
         self.begin_requests(view, 1)
