@@ -11,6 +11,7 @@
 
 #include <algorithm>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -150,6 +151,55 @@ TEST_CASE("what is no building is looked at from around", "[import]") {
         machine.push_back({corner, corner + Vec3d{1.2, 1.2, 1.2}, i});
     }
     CHECK(around(machine));
+}
+
+// Fails when a room counts as open though light reaches it nowhere, or as closed though one wall is missing,
+// and when the lamp is as bright as for another wall.
+TEST_CASE("a place is within what surrounds it, and not within what is open", "[import]") {
+    const std::vector<PaintedTriangle> closed = trianglesOf({{{-1, -2, -3}, {1, 2, 3}, 0}});
+    for (const auto& [ahead, nearest, farthest] :
+         {std::tuple{Vec3d{1, 0, 0}, 1.0, 1.04}, {Vec3d{0, 1, 0}, 2.0, 2.07}, {Vec3d{0, 0, -1}, 3.0, 3.1}}) {
+        const auto distance = distanceWithin(closed, {0, 0, 0}, ahead, 0.5);
+        REQUIRE(distance);
+        CHECK(*distance >= nearest);
+        CHECK(*distance < farthest);
+    }
+    CHECK_FALSE(distanceWithin(closed, {1.5, 0, 0}, {1, 0, 0}, 1));
+    for (std::size_t side = 0; side < 6; ++side) {
+        auto open = closed;
+        open.erase(open.begin() + static_cast<std::ptrdiff_t>(2 * side),
+                   open.begin() + static_cast<std::ptrdiff_t>(2 * side + 2));
+        CHECK_FALSE(distanceWithin(open, {0, 0, 0}, {1, 0, 0}, 1));
+    }
+    CHECK_FALSE(distanceWithin({}, {0, 0, 0}, {1, 0, 0}, 1));
+}
+
+// Fails when a camera of the file under a dome sees a black picture, or a free one has a lamp beside it.
+TEST_CASE("a camera of a glTF that is surrounded has a lamp with it", "[gltf][import]") {
+    const TemporaryFolder folder;
+    const auto lightOf = [&](const Vec3d& camera, bool has_lamp) {
+        GltfMaker maker;
+        maker.add("materials", {{"name", "sky"}});
+        std::vector<float> corners;
+        for (const PaintedTriangle& t : trianglesOf({{{-9, -9, -9}, {9, 9, 9}, 0}}))
+            for (const auto& way : {std::array<float, 3>{}, t.to_second, t.to_third})
+                for (std::size_t k = 0; k < 3; ++k) corners.push_back(t.corner[k] + way[k]);
+        maker.node({{"mesh", maker.mesh({{"attributes", {{"POSITION", maker.points(corners)}}},
+                                         {"material", 0}})}});
+        maker.add("cameras", {{"type", "perspective"}, {"perspective", {{"yfov", 1}, {"znear", 0.1}}}});
+        maker.node({{"camera", 0}, {"translation", {camera[0], camera[1], camera[2]}}});
+        if (has_lamp) {
+            maker.root["extensions"]["KHR_lights_punctual"]["lights"] = {
+                {{"type", "point"}, {"intensity", 2}}};
+            maker.node({{"extensions", {{"KHR_lights_punctual", {{"light", 0}}}}}});
+        }
+        GltfFiles files;
+        const CapturedLog log;
+        return importModel(files, folder.write("a.glb", maker.glb())).scene;
+    };
+    CHECK_THAT(lightOf({0, 0, 0}, false), Contains("name: camera, type: point") && !Contains("type: sun"));
+    CHECK_THAT(lightOf({0, 0, 30}, false), Contains("type: sun") && !Contains("type: point"));
+    CHECK_THAT(lightOf({0, 0, 0}, true), !Contains("name: camera"));
 }
 
 // Fails when a format loses the choice, its materials or its placements on the way.

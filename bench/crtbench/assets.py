@@ -2,9 +2,9 @@
 
     bench/run assets FOLDER…    every model and every scene of pbrt or Mitsuba below each folder, small
 
-Times nothing. A model must render, with every pixel finite and not all alike, or be refused with code 3 and
-a sentence; anything else (a crash, a hang, an empty picture, a copy of the program's memory beyond
---memory) ends with code 1. --pictures keeps the images and a sheet of them.
+Times nothing. A model must render, with every pixel finite and not all alike or black, or be refused with
+code 3 and a sentence; anything else (a crash, a hang, an empty picture, a copy of the program's memory
+beyond --memory) ends with code 1. --pictures keeps the images and a sheet of them.
 """
 
 import math
@@ -50,9 +50,10 @@ class Model:
         self.finite = all(map(math.isfinite, values))
         self.varied = len(set(values)) > 3
         self.picture = shown.read_bytes() if self.code == 0 else None
+        self.black = self.picture is not None and mean_of(self.picture) < foreign_scenes.BLACK
 
     def renders(self):
-        return self.code == 0 and self.finite and self.varied
+        return self.code == 0 and self.finite and self.varied and not self.black
 
     def refused(self):
         return self.code == 3 and len(self.error) > 10
@@ -63,7 +64,7 @@ class Model:
         if self.refused():
             return "refused"
         if self.code == 0:
-            return "one colour" if self.finite else "not finite"
+            return "not finite" if not self.finite else "black" if self.black else "one colour"
         return f"code {self.code}"
 
 
@@ -78,6 +79,12 @@ def run(program, arguments):
                               text=True, errors="replace", timeout=SECONDS_AT_MOST, preexec_fn=limit)
     except subprocess.TimeoutExpired:
         return subprocess.CompletedProcess(command, 124, "", f"not done after {SECONDS_AT_MOST} s")
+
+
+def mean_of(picture):
+    """The mean of the values of a PPM of 8 bits; white is 1."""
+    values = picture[-3 * RESOLUTION * RESOLUTION:]
+    return sum(values) / (255 * len(values))
 
 
 def sheet(models):
@@ -118,13 +125,14 @@ def measure(program, arguments):
         f"Every glTF, GLB, OBJ and PLY file below each folder as `crt MODEL` renders it, {RESOLUTION} × "
         f"{RESOLUTION} pixels, {SAMPLES} samples, on `{backend}`, within {SECONDS_AT_MOST} s and "
         f"{MEMORY_AT_MOST >> 30} GiB of addresses. A file renders when crt ends with code 0, all pixels are "
-        "finite and they are not all of one colour; it is refused when crt ends with code 3 and says why. "
+        "finite and the picture is neither black nor of one colour; it is refused when crt ends with code 3 "
+        "and says why. "
         "Nothing of these files is part of crt."
     )
     if arguments.note:
         results.paragraph(arguments.note)
     corpora, scenes = {}, []
-    for folder in arguments.folders:
+    for folder in map(pathlib.Path.resolve, arguments.folders):
         for path in foreign_scenes.scenes(folder):
             scene = foreign_scenes.Scene(program, backend, folder, path)
             scenes.append((folder.name, scene))

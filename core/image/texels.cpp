@@ -260,8 +260,10 @@ std::vector<float> linearRgb(const Texels& texels, TexelColor color, const std::
             decode<std::uint16_t>(texels, linearOfCodes(texels.info.type, color), rgb);
             break;
         case TexelType::Float:
-            // A table that is not empty says that the floats are encoded.
-            decode<float>(texels, std::vector<float>(color == TexelColor::Srgb ? 1 : 0), rgb);
+            if (texels.info.channels == 3 && color != TexelColor::Srgb)
+                std::memcpy(rgb.data(), texels.bytes.data(), rgb.size() * sizeof(float));
+            else  // A table that is not empty says that the floats are encoded.
+                decode<float>(texels, std::vector<float>(color == TexelColor::Srgb ? 1 : 0), rgb);
             break;
     }
     if (const std::optional<Matrix3d> to_srgb = primariesToSrgb(texels.info, path))

@@ -183,6 +183,14 @@ class OtherRenderers(CliTest):
             run = self.crt("other.xml", expect=3, CRT_PYTHON=python)
             self.assert_one_error(run, "a scene of Mitsuba", "python3 -m crt import other.xml")
 
+    def test_a_module_that_the_package_needs_is_named(self):
+        os.makedirs(self.path("package/crt"))
+        self.write("package/crt/__init__.py", "import a_module_that_there_is_not\n")
+        self.write("package/crt/foreign_scenes.py", "")
+        run = self.crt("other.xml", expect=3, CRT_PYTHON="python3", PYTHONPATH=self.path("package"))
+        self.assert_one_error(run, "needs the module 'a_module_that_there_is_not'", "CRT_PYTHON")
+        self.assertNotIn("Traceback", run.stderr)
+
     def test_what_lies_in_the_working_directory_is_not_run(self):
         os.makedirs(self.path("crt/importers"))
         for name in ("crt/__init__.py", "crt/__main__.py", "importlib.py"):

@@ -60,7 +60,7 @@ public:
 
 private:
     std::string objectsText();
-    std::vector<PaintedTriangle> paintedTriangles();
+    std::vector<PaintedTriangle> paintedTriangles(std::size_t fewest_materials);
     std::string primitiveText(int mesh, std::size_t number, const std::vector<Matrix4d>& worlds,
                               const std::string& name);
     std::string cameraText();
@@ -84,7 +84,7 @@ private:
     Bounds bounds_;
     double extent_ = 0, mirroring_extent_ = 0;   ///< Squares of sizes of primitives, as a measure of area.
     std::vector<std::vector<Matrix4d>> worlds_;  ///< By mesh, where it stands.
-    std::optional<InnerView> inner_;             ///< Where the chosen camera is, if not around everything.
+    std::optional<InnerView> inner_;             ///< Of the camera, if it is within the model.
 };
 
 double luminanceOf(const std::vector<double>& c) {
@@ -197,7 +197,8 @@ std::string Writer::objectsText() {
 }
 
 /// The geometry of the objects, in the world; nothing if it is too much to search for a place in.
-std::vector<PaintedTriangle> Writer::paintedTriangles() {
+/// None of a model that is too large, or has fewer materials.
+std::vector<PaintedTriangle> Writer::paintedTriangles(std::size_t fewest_materials) {
     std::vector<PaintedTriangle> triangles;
     const auto forPrimitives = [&](const auto& what) {
         for (std::size_t mesh = 0; mesh < worlds_.size(); ++mesh)
@@ -214,7 +215,7 @@ std::vector<PaintedTriangle> Writer::paintedTriangles() {
         corners += worlds_[mesh].size() * model_.accessors[static_cast<std::size_t>(accessor)].count;
         materials.insert(model_.meshes[mesh].primitives[k].material);
     });
-    if (corners > 3 * kMostPaintedTriangles || materials.size() < kFewestMaterialsOfBuildings)
+    if (corners > 3 * kMostPaintedTriangles || materials.size() < fewest_materials)
         return triangles;
     forPrimitives([&](std::size_t mesh, std::size_t k, int) {
         if (worlds_[mesh].empty()) return;
@@ -279,13 +280,18 @@ std::string Writer::cameraText() {
         camera =
             fmt::format("position: {}, target: {}, up: {}, fov: {}", yamlList(position), yamlList(target),
                         yamlList(up * (1 / length(up))), yamlNumber(shorter * kDegrees));
+        // Light from outside does not reach a closed room, or what is under the dome of a painted sky.
+        if (graph_.lights.empty())
+            if (const auto distance =
+                    distanceWithin(paintedTriangles(1), position, ahead * (1 / way), shorter))
+                inner_ = InnerView{position, target, shorter * kDegrees, *distance};
     }
     const int width = aspect >= 1 ? kLonger : std::max(static_cast<int>(std::lround(kLonger * aspect)), 1),
               height = aspect >= 1 ? std::max(static_cast<int>(std::lround(kLonger / aspect)), 1) : kLonger;
     std::string text;
     if (camera.empty()) {
         const double chosen_aspect = static_cast<double>(width) / height;
-        inner_ = innerView(paintedTriangles(), chosen_aspect);
+        inner_ = innerView(paintedTriangles(kFewestMaterialsOfBuildings), chosen_aspect);
         text += chosenCamera(bounds_, inner_, chosen_aspect, losses_);
     } else {
         text += fmt::format("\ncamera: {{{}}}\n", camera);

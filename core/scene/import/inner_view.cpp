@@ -180,6 +180,25 @@ Materials seenFromAround(const Tree& tree) {
     return seen;
 }
 
+constexpr int kAround = 256;
+
+/// The directions of a spiral of equal solid angles.
+Vec3d directionAround(int i, int count = kAround) {
+    const double y = 1 - (2 * i + 1.0) / count, flat = std::sqrt(1 - y * y),
+                 turn = i * kPi * (3 - std::sqrt(5.0));
+    return {flat * std::cos(turn), y, flat * std::sin(turn)};
+}
+
+/// The value that this share of them is below.
+double quantileOf(std::vector<double> values, double share) {
+    const auto at = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size()));
+    std::nth_element(values.begin(), at, values.end());
+    return *at;
+}
+
+/// Single precision, in which triangles are kept, holds what is of this size.
+bool isOfUsualSize(double radius) { return radius > 1e-15 && radius < 1e15; }
+
 /// The view from a place.
 struct Place {
     Vec3d position;
@@ -188,25 +207,21 @@ struct Place {
 
 /// A place that is within something, in the open there, and shows more than `least` materials.
 std::optional<Place> placeAt(const Tree& tree, const Vec3d& position, std::size_t least) {
-    constexpr int kRays = 256;
     constexpr double kLeastFronts = 0.6;  // Of all rays: a court is open above.
     constexpr double kMostBacks = 0.02;   // More are within a body.
     constexpr double kClearance = 0.01;   // Of the radius.
     const double clearance = kClearance * tree.bounds().radius();
     Place place{position, {}};
     int fronts = 0, backs = 0;
-    for (int i = 0; i < kRays; ++i) {
-        // A spiral of equal solid angles.
-        const double y = 1 - (2 * i + 1.0) / kRays, flat = std::sqrt(1 - y * y),
-                     turn = i * kPi * (3 - std::sqrt(5.0));
-        const Hit hit = tree.nearest(position, {flat * std::cos(turn), y, flat * std::sin(turn)});
+    for (int i = 0; i < kAround; ++i) {
+        const Hit hit = tree.nearest(position, directionAround(i));
         if (!hit.any()) continue;
         if (hit.distance < clearance) return std::nullopt;
         ++(hit.front ? fronts : backs);
         if (hit.front) place.seen.insert(hit.material);
-        if (backs > kMostBacks * kRays) return std::nullopt;
+        if (backs > kMostBacks * kAround) return std::nullopt;
     }
-    if (fronts < kLeastFronts * kRays || place.seen.size() <= least) return std::nullopt;
+    if (fronts < kLeastFronts * kAround || place.seen.size() <= least) return std::nullopt;
     return place;
 }
 
@@ -237,9 +252,8 @@ Candidate viewFrom(const Tree& tree, const Vec3d& position, const Vec3d& ahead, 
                    if (hit.front) seen.insert(hit.material);
                });
     if (distances.empty()) return candidate;
-    const auto half = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
-    std::nth_element(distances.begin(), half, distances.end());
-    candidate.view = {position, position + ahead * *half, kFov_deg, *half};
+    const double half = quantileOf(std::move(distances), 0.5);
+    candidate.view = {position, position + ahead * half, kFov_deg, half};
     candidate.materials = seen.size();
     return candidate;
 }
@@ -269,7 +283,7 @@ std::optional<InnerView> innerView(const std::vector<PaintedTriangle>& triangles
         bounds.add(own.upper);
     }
     const double radius = bounds.radius();
-    if (all.size() < kFewestMaterialsOfBuildings || !(radius > 1e-15 && radius < 1e15)) return std::nullopt;
+    if (all.size() < kFewestMaterialsOfBuildings || !isOfUsualSize(radius)) return std::nullopt;
     const Tree tree(triangles);
     const std::size_t around = std::max<std::size_t>(seenFromAround(tree).size(), 1);
     if (all.size() <= kMoreThan * around) return std::nullopt;
@@ -292,6 +306,24 @@ std::optional<InnerView> innerView(const std::vector<PaintedTriangle>& triangles
                 std::max(best, viewFrom(tree, place.position, {std::sin(turn), 0, -std::cos(turn)}, aspect));
         }
     return best.materials > 0 && !tree.isExhausted() ? std::optional(best.view) : std::nullopt;
+}
+
+std::optional<double> distanceWithin(const std::vector<PaintedTriangle>& triangles, const Vec3d& position,
+                                     const Vec3d& ahead, double fov) {
+    constexpr int kFine = 64 * kAround;
+    constexpr double kLeastFov = 0.1;  // It still holds 10 directions.
+    constexpr double kNearest = 0.25;  // Before the dome of a sky there are things to look at.
+    if (triangles.empty()) return std::nullopt;
+    const Tree tree(triangles);
+    if (!isOfUsualSize(tree.bounds().radius())) return std::nullopt;
+    for (int i = 0; i < kAround; ++i)
+        if (!tree.nearest(position, directionAround(i)).any()) return std::nullopt;
+    const double seen = std::cos(std::max(fov, kLeastFov) / 2);
+    std::vector<double> distances;
+    for (int i = 0; i < kFine; ++i)
+        if (const Vec3d direction = directionAround(i, kFine); dot(direction, ahead) > seen)
+            distances.push_back(tree.nearest(position, direction).distance);
+    return quantileOf(std::move(distances), kNearest);
 }
 
 }  // namespace crt

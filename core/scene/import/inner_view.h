@@ -1,4 +1,6 @@
-/// Finds a camera for a building: a place inside a model that shows more of it than a view from outside.
+/// Looks at a model from within. Finds a camera for a building: a place that shows more of it than a view
+/// from outside. Finds whether a camera of the file is in a closed room or under a dome, which no light from
+/// outside reaches.
 #pragma once
 
 #include "base/vec3d.h"
@@ -28,7 +30,7 @@ inline constexpr std::size_t kFewestMaterialsOfBuildings = 3;
 struct InnerView {
     Vec3d position, target;
     double fov_deg;
-    double distance;  ///< Of half of what is seen, the nearer half.
+    double distance;  ///< Half of what is seen is nearer; of what is within, a quarter.
 };
 
 /// A place for the camera within the model, if one shows the front sides of more than twice as many
@@ -36,5 +38,11 @@ struct InnerView {
 /// car and a figure show outside what they are made of, and what has one material has nothing to tell by.
 /// The same for the same triangles: directions are fixed. `aspect` is width over height.
 std::optional<InnerView> innerView(const std::vector<PaintedTriangle>& triangles, double aspect);
+
+/// The distance of the nearest quarter of what is seen from a place, if triangles surround the place: every
+/// one of 256 directions meets one. Windows and panes count as walls. `ahead` has length 1, `fov` is in
+/// radians.
+std::optional<double> distanceWithin(const std::vector<PaintedTriangle>& triangles, const Vec3d& position,
+                                     const Vec3d& ahead, double fov);
 
 }  // namespace crt

@@ -95,7 +95,7 @@ std::string chosenLight(const std::optional<InnerView>& inner) {
         return text +
                "  - {name: key, type: sun, direction: [0.4, -0.75, -0.55], angular_diameter_deg: 20, "
                "radiance: {rgb: [20, 20, 20], space: linear}}\n";
-    // As bright as the other where half of what is seen is nearer.
+    // As bright as the other at that distance.
     const double intensity = kIrradiance * inner->distance * inner->distance;
     return text + fmt::format(
                       "  - {{name: camera, type: point, position: {}, radiant_intensity: {{rgb: {}, space: "
