@@ -203,12 +203,15 @@ TEST_CASE("a camera of a glTF that is surrounded has a lamp with it", "[gltf][im
 }
 
 // Fails when a format loses the choice, its materials or its placements on the way.
-TEST_CASE("twenty thousand triangles on one spot are looked at from around, in seconds",
+TEST_CASE("twenty thousand triangles on one spot, or boxes in each other, take seconds",
           "[import][limits]") {
     std::vector<PaintedTriangle> triangles;
     for (std::uint32_t i = 0; i < 20000; ++i)
         triangles.emplace_back(Vec3d{0, 0, 0}, Vec3d{1, 0, 0}, Vec3d{0, 1, 0}, i);
     CHECK(secondsOf([&] { CHECK_FALSE(innerView(triangles, 1)); }) < 4 * kSecondsAllowed);
+    const auto boxes = trianglesOf(std::vector<Box>(5000, {{-1, -1, -1}, {1, 1, 1}, 0}));
+    CHECK(secondsOf([&] { CHECK_FALSE(distanceWithin(boxes, {0, 0, 0}, {1, 0, 0}, 3)); }) <
+          4 * kSecondsAllowed);
 }
 
 TEST_CASE("a house as OBJ and as glTF is seen by a camera within it, with a lamp there", "[gltf][import]") {

@@ -1899,12 +1899,10 @@ def make_samples():
 
 
 def sentence(result):
-    """The first line that says what happened."""
+    """The first line that says what happened, behind one that leads to a list of errors."""
     if result["case"].how.get("stderr") or result["code"] == 0:
         return ""
-    lines = [
-        line for line in result["text"].splitlines() if "error:" in line and not line.endswith("as it is:")
-    ]
+    lines = [line for line in result["text"].splitlines() if "error:" in line and not line.endswith(":")]
     lines = lines or [line for line in result["text"].splitlines() if "stopped by" in line]
     text = lines[0].replace("crt: error: ", "").replace("crt: info: ", "") if lines else ""
     text = (

@@ -50,7 +50,9 @@ void testTriangle(const PaintedTriangle& triangle, const Vec3d& origin, const Ve
 /// rays that are asked for.
 class Tree {
 public:
-    explicit Tree(const std::vector<PaintedTriangle>& triangles) : triangles_(triangles) {
+    /// `rays`: about as many are asked for.
+    Tree(const std::vector<PaintedTriangle>& triangles, std::uint64_t rays)
+        : triangles_(triangles), most_steps_(rays * kStepsOfRay) {
         order_.resize(triangles.size());
         std::iota(order_.begin(), order_.end(), 0u);
         nodes_.reserve(2 * triangles.size() / kLeaf + 1);
@@ -67,13 +69,12 @@ public:
 
     /// True if the rays took more steps than allowed, as when all triangles lie at one place. Further ones
     /// find nothing.
-    bool isExhausted() const { return steps_ > kMostSteps; }
+    bool isExhausted() const { return steps_ > most_steps_; }
 
 private:
     static constexpr std::size_t kLeaf = 4;
-    /// Nodes visited and triangles tested by all rays: a thousand for each, three times what large buildings
-    /// take.
-    static constexpr std::uint64_t kMostSteps = 300'000'000;
+    /// Nodes visited and triangles tested: three times what large buildings take.
+    static constexpr std::uint64_t kStepsOfRay = 1000;
 
     struct Node {
         Bounds bounds;
@@ -88,6 +89,7 @@ private:
     static double entry(const Bounds& bounds, const Vec3d& origin, const Vec3d& inverse, double limit);
 
     const std::vector<PaintedTriangle>& triangles_;
+    const std::uint64_t most_steps_;
     std::vector<std::uint32_t> order_;
     std::vector<Node> nodes_;
     mutable std::uint64_t steps_ = 0;
@@ -284,7 +286,7 @@ std::optional<InnerView> innerView(const std::vector<PaintedTriangle>& triangles
     }
     const double radius = bounds.radius();
     if (all.size() < kFewestMaterialsOfBuildings || !isOfUsualSize(radius)) return std::nullopt;
-    const Tree tree(triangles);
+    const Tree tree(triangles, 300'000);
     const std::size_t around = std::max<std::size_t>(seenFromAround(tree).size(), 1);
     if (all.size() <= kMoreThan * around) return std::nullopt;
     std::vector<Place> places;
@@ -314,7 +316,7 @@ std::optional<double> distanceWithin(const std::vector<PaintedTriangle>& triangl
     constexpr double kLeastFov = 0.1;  // It still holds 10 directions.
     constexpr double kNearest = 0.25;  // Before the dome of a sky there are things to look at.
     if (triangles.empty()) return std::nullopt;
-    const Tree tree(triangles);
+    const Tree tree(triangles, kAround + kFine);
     if (!isOfUsualSize(tree.bounds().radius())) return std::nullopt;
     for (int i = 0; i < kAround; ++i)
         if (!tree.nearest(position, directionAround(i)).any()) return std::nullopt;
@@ -323,6 +325,7 @@ std::optional<double> distanceWithin(const std::vector<PaintedTriangle>& triangl
     for (int i = 0; i < kFine; ++i)
         if (const Vec3d direction = directionAround(i, kFine); dot(direction, ahead) > seen)
             distances.push_back(tree.nearest(position, direction).distance);
+    if (tree.isExhausted()) return std::nullopt;
     return quantileOf(std::move(distances), kNearest);
 }
 

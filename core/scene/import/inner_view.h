@@ -30,7 +30,7 @@ inline constexpr std::size_t kFewestMaterialsOfBuildings = 3;
 struct InnerView {
     Vec3d position, target;
     double fov_deg;
-    double distance;  ///< Half of what is seen is nearer; of what is within, a quarter.
+    double distance;  ///< Half of what is seen is nearer; for a camera of the file, a quarter.
 };
 
 /// A place for the camera within the model, if one shows the front sides of more than twice as many
