@@ -172,6 +172,9 @@ TEST_CASE("a place is within what surrounds it, and not within what is open", "[
         CHECK_FALSE(distanceWithin(open, {0, 0, 0}, {1, 0, 0}, 1));
     }
     CHECK_FALSE(distanceWithin({}, {0, 0, 0}, {1, 0, 0}, 1));
+    for (const double factor : {0.0, 1e30, 1e300})  // The last one is not in single precision.
+        CHECK_FALSE(
+            distanceWithin(trianglesOf(scaled({kRoom}, factor, {0, 0, 0})), {0, 0, 0}, {1, 0, 0}, 1));
 }
 
 // Fails when a camera of the file under a dome sees a black picture, or a free one has a lamp beside it.

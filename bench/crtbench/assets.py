@@ -126,8 +126,7 @@ def measure(program, arguments):
         f"{RESOLUTION} pixels, {SAMPLES} samples, on `{backend}`, within {SECONDS_AT_MOST} s and "
         f"{MEMORY_AT_MOST >> 30} GiB of addresses. A file renders when crt ends with code 0, all pixels are "
         "finite and the picture is neither black nor of one colour; it is refused when crt ends with code 3 "
-        "and says why. "
-        "Nothing of these files is part of crt."
+        "and says why. Nothing of these files is part of crt."
     )
     if arguments.note:
         results.paragraph(arguments.note)

@@ -196,8 +196,8 @@ std::string Writer::objectsText() {
     return text;
 }
 
-/// The geometry of the objects, in the world; nothing if it is too much to search for a place in.
-/// None of a model that is too large, or has fewer materials.
+/// The geometry of the objects, in the world; nothing if it is too much to search for a place in, or has
+/// fewer materials.
 std::vector<PaintedTriangle> Writer::paintedTriangles(std::size_t fewest_materials) {
     std::vector<PaintedTriangle> triangles;
     const auto forPrimitives = [&](const auto& what) {

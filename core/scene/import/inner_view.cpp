@@ -198,8 +198,18 @@ double quantileOf(std::vector<double> values, double share) {
     return *at;
 }
 
-/// Single precision, in which triangles are kept, holds what is of this size.
-bool isOfUsualSize(double radius) { return radius > 1e-15 && radius < 1e15; }
+/// True if single precision, in which triangles are kept, holds them. Only then may a tree be built: what is
+/// not a number has no order.
+bool isOfUsualSize(const std::vector<PaintedTriangle>& triangles) {
+    Bounds bounds;
+    for (const PaintedTriangle& t : triangles) {
+        const Bounds own = boundsOf(t);
+        bounds.add(own.lower);
+        bounds.add(own.upper);
+    }
+    const double radius = bounds.radius();
+    return radius > 1e-15 && radius < 1e15;
+}
 
 /// The view from a place.
 struct Place {
@@ -277,21 +287,15 @@ std::optional<InnerView> innerView(const std::vector<PaintedTriangle>& triangles
     constexpr std::size_t kBest = 8;
     constexpr int kAzimuths = 16;
     Materials all;
-    Bounds bounds;
-    for (const PaintedTriangle& t : triangles) {
-        all.insert(t.material);
-        const Bounds own = boundsOf(t);
-        bounds.add(own.lower);
-        bounds.add(own.upper);
-    }
-    const double radius = bounds.radius();
-    if (all.size() < kFewestMaterialsOfBuildings || !isOfUsualSize(radius)) return std::nullopt;
+    for (const PaintedTriangle& t : triangles) all.insert(t.material);
+    if (all.size() < kFewestMaterialsOfBuildings || !isOfUsualSize(triangles)) return std::nullopt;
     const Tree tree(triangles, 300'000);
     const std::size_t around = std::max<std::size_t>(seenFromAround(tree).size(), 1);
     if (all.size() <= kMoreThan * around) return std::nullopt;
     std::vector<Place> places;
     for (int i = 0; i < kPlaces * kPlaces * kPlaces; ++i) {
         const std::array<int, 3> at{i % kPlaces, i / kPlaces % kPlaces, i / (kPlaces * kPlaces)};
+        const Bounds& bounds = tree.bounds();
         Vec3d position = bounds.lower;
         for (std::size_t k = 0; k < 3; ++k)
             position[k] += (bounds.upper[k] - bounds.lower[k]) * (at[k] + 0.5) / kPlaces;
@@ -315,9 +319,8 @@ std::optional<double> distanceWithin(const std::vector<PaintedTriangle>& triangl
     constexpr int kFine = 64 * kAround;
     constexpr double kLeastFov = 0.1;  // It still holds 10 directions.
     constexpr double kNearest = 0.25;  // Before the dome of a sky there are things to look at.
-    if (triangles.empty()) return std::nullopt;
+    if (triangles.empty() || !isOfUsualSize(triangles)) return std::nullopt;
     const Tree tree(triangles, kAround + kFine);
-    if (!isOfUsualSize(tree.bounds().radius())) return std::nullopt;
     for (int i = 0; i < kAround; ++i)
         if (!tree.nearest(position, directionAround(i)).any()) return std::nullopt;
     const double seen = std::cos(std::max(fov, kLeastFov) / 2);
