@@ -1,9 +1,11 @@
 // Scenes that a GPU renders in waves, and the kernels that they need.
 #include "backend/sdk/gpu_schedule.h"
 #include "compiled_scenes.h"
+#include "gpu/gpu_wavefront.h"
 #include "gpu/wave_plan.h"
 
 #include <algorithm>
+#include <cstdlib>
 #include <set>
 
 using namespace compile_test;
@@ -175,4 +177,71 @@ TEST_CASE("no two queues are one, and there is room for all", "[wavefront]") {
     CHECK(plan.queues() == queues.size());
     CHECK(*queues.rbegin() < plan.queues());
     CHECK(plan.queues() <= CRT_WAVE_QUEUES);
+}
+
+namespace {
+
+/// A device that runs nothing: it notes what is launched, and answers that all slots are done.
+class NotingDevice final : public crt::gpu::GpuDevice {
+public:
+    struct Noted {
+        std::string name;
+        std::uint32_t lane;
+    };
+    std::vector<Noted> launches;
+
+    NotingDevice() {
+        traits_.memory_bytes = std::uint64_t{1} << 30;
+        traits_.struct_arguments = true;
+    }
+    std::unique_ptr<crt::gpu::GpuProgram> makeProgram(const crt::plugin::Host&, const crt::gpu::Specs&,
+                                                      CrtKernelChoice) override {
+        return nullptr;
+    }
+    std::uint64_t freeBytes() const override { return traits_.memory_bytes; }
+    void fill(const crt::gpu::GpuBuffer&, unsigned char, std::uint64_t, std::uint64_t) const override {}
+    void write(const crt::gpu::GpuBuffer&, const void*) const override {}
+    void read(const crt::gpu::GpuBuffer&, void* to, std::uint64_t, std::uint64_t bytes) const override {
+        std::fill_n(static_cast<unsigned char*>(to), bytes, static_cast<unsigned char>(0xff));
+    }
+    void launch(void*, const char* name, const crt::gpu::GpuGrid& grid,
+                const crt::gpu::GpuArguments&) override {
+        launches.push_back({name, grid.lane});
+    }
+    double seconds(const std::function<void()>& start) override { return start(), 1.0; }
+
+private:
+    std::shared_ptr<void> take(std::uint64_t bytes) override { return {std::malloc(bytes), std::free}; }
+};
+
+}  // namespace
+
+TEST_CASE("in a pass, shaders run at the same time, and all else alone", "[wavefront]") {
+    crt::Scene scene =
+        sceneOf({crt::MaterialType::Diffuse, crt::MaterialType::Mirror, crt::MaterialType::Mix});
+    scene.materials[2].parts = {0, 1};
+    const CompiledScene c = compiled(scene);
+    NotingDevice device;
+    crt::gpu::Wavefront wavefront(device, c.data());
+    std::vector<crt::gpu::GpuKernel> kernels;
+    for (const KernelSpec& spec : wavefront.plan().kernels) kernels.push_back({spec});
+    crt::Launch launch;
+    launch.x1 = launch.y1 = 16;
+    launch.sample_count = 3;
+    const crt::gpu::GpuBuffer none;
+    const crt::gpu::GpuFilm film;
+    wavefront.launch(kernels, launch, 1, {c.header(), none, film, none}, [] {});
+
+    constexpr std::size_t kOfAPass = 4;  // trace, choose, and one shader for each material
+    REQUIRE(device.launches.size() == (launch.sample_count + 1) * kOfAPass);
+    for (std::size_t i = 0; i < device.launches.size(); i += kOfAPass) {
+        const NotingDevice::Noted* pass = &device.launches[i];
+        CHECK(pass[0].name == "crt_trace");
+        CHECK(pass[0].lane == 0);
+        CHECK(pass[1].name == "crt_choose_queue");
+        CHECK(pass[1].lane == 0);
+        CHECK(pass[2].name == "crt_shade_queue");
+        CHECK(pass[3].name == "crt_shade_queue");
+        CHECK(std::set<std::uint32_t>{0, pass[2].lane, pass[3].lane}.size() == 3);
+    }
 }

@@ -158,6 +158,12 @@ std::shared_ptr<CUevent_st> makeEvent() {
     return {event, [](CUevent made) { driver().cuEventDestroy(made); }};
 }
 
+std::shared_ptr<CUstream_st> makeStream() {
+    CUstream stream = nullptr;
+    driver().check(driver().cuStreamCreate(&stream, CU_STREAM_DEFAULT), "creating a stream");
+    return {stream, [](CUstream made) { driver().cuStreamDestroy(made); }};
+}
+
 CUdeviceptr addressOf(const GpuBuffer& buffer) { return reinterpret_cast<CUdeviceptr>(buffer.handle); }
 
 }  // namespace
@@ -224,9 +230,13 @@ void CudaDevice::launch(void* entry, const char* name, const gpu::GpuGrid& grid,
     pointers_.clear();
     for (const gpu::GpuArgument& argument : arguments)
         pointers_.push_back(const_cast<void*>(argument.value));
+    // The default stream waits for the others, and they for it.
+    while (lanes_.size() < grid.lane) lanes_.push_back(makeStream());
     const CUresult result =
         driver().cuLaunchKernel(static_cast<CUfunction>(entry), static_cast<unsigned>(grid.blocks),
-                                grid.rows, 1, grid.threads, 1, 1, 0, nullptr, pointers_.data(), nullptr);
+                                grid.rows, 1, grid.threads, 1, 1, 0,
+                                grid.lane == 0 ? nullptr : lanes_[grid.lane - 1].get(), pointers_.data(),
+                                nullptr);
     if (result != CUDA_SUCCESS) driver().check(result, std::string("launching ") + name);
 }
 

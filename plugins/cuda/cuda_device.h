@@ -30,6 +30,7 @@ using gpu::GpuBuffer;
     F(cuFuncGetAttribute) F(cuFuncSetCacheConfig) F(cuOccupancyMaxActiveBlocksPerMultiprocessor)      \
         F(cuLaunchKernel)                                                                             \
     F(cuMemAlloc) F(cuMemFree) F(cuMemGetInfo) F(cuMemcpyHtoD) F(cuMemcpyDtoH) F(cuMemsetD8)          \
+    F(cuStreamCreate) F(cuStreamDestroy)                                                              \
     F(cuEventCreate) F(cuEventDestroy) F(cuEventRecord) F(cuEventSynchronize) F(cuEventElapsedTime)
 
 /// The driver's functions, initialised. One for the process; never closed, as drivers leave threads behind.
@@ -92,6 +93,7 @@ private:
     Device device_;
     std::shared_ptr<CUctx_st> context_;
     std::shared_ptr<CUevent_st> start_, end_;
+    std::vector<std::shared_ptr<CUstream_st>> lanes_;  ///< From 1 on; 0 is the default stream.
     std::vector<void*> pointers_;  ///< To a launch's arguments.
 };
 

@@ -39,6 +39,9 @@ struct GpuGrid {
     std::uint64_t blocks;
     std::uint32_t threads;   ///< Of a block.
     std::uint32_t rows = 1;  ///< Each has that many blocks.
+    /// Launches of different lanes may run at the same time, but for lane 0: its launches begin when all
+    /// launches before have ended, and end before any launch after begins.
+    std::uint32_t lane = 0;
 };
 
 /// Properties that decide how the common code works on a device.

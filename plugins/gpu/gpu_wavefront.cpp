@@ -97,16 +97,18 @@ void Wavefront::runPass(const std::vector<GpuKernel>& kernels, const kernel::Crt
     const std::uint64_t blocks = wave.slots / CRT_WAVE_BLOCK;
     GpuArguments arguments = argumentsOf(wave, target);
     arguments.push_back(pass);
-    const auto start = [&](const GpuKernel& kernel, std::uint64_t most) {
-        device_.launch(kernel.entry, entryName(kernel.spec.entry), {std::min(blocks, most), CRT_WAVE_BLOCK},
-                       arguments);
+    const auto start = [&](const GpuKernel& kernel, std::uint64_t most, std::uint32_t lane) {
+        device_.launch(kernel.entry, entryName(kernel.spec.entry),
+                       {std::min(blocks, most), CRT_WAVE_BLOCK, 1, lane}, arguments);
     };
-    start(kernels.front(), blocks);
+    start(kernels.front(), blocks, 0);
     // Only the device has the length of a queue: as many blocks as it holds at once take turns.
-    if (plan_.queue_of_choice != CRT_NONE) start(kernels.back(), kernels.back().resident_blocks);
+    if (plan_.queue_of_choice != CRT_NONE) start(kernels.back(), kernels.back().resident_blocks, 0);
+    // A slot is in one queue, so that the shaders of all queues may run at the same time.
     std::uint32_t queue = 0;
     arguments.push_back(queue);
-    for (; queue < plan_.shaders(); ++queue) start(kernels[queue + 1], kernels[queue + 1].resident_blocks);
+    for (; queue < plan_.shaders(); ++queue)
+        start(kernels[queue + 1], kernels[queue + 1].resident_blocks, queue + 1);
 }
 
 void Wavefront::runWave(const std::vector<GpuKernel>& kernels, const kernel::CrtWave& wave,
