@@ -4,7 +4,9 @@
 #include "base/statistics.h"
 #include "film/error_estimate.h"
 
+#include <algorithm>
 #include <cmath>
+#include <optional>
 
 using namespace conformance;
 
@@ -53,4 +55,33 @@ TEST_CASE(
     // % band.
     CHECK(squares / claimed > crt::stats::fisherQuantile(0.00005, kSeeds, 15.0 * kSeeds));
     CHECK(squares / claimed < crt::stats::fisherQuantile(0.99995, kSeeds, 15.0 * kSeeds));
+}
+
+TEST_CASE("a film's replicates of X, Y and Z are the sums of their own samples", "[error]") {
+    Run run;
+    run.samples = 32;
+    run.aovs = crt::kAovColorError;
+    const crt::Scene scene =
+        sceneFrom(kSquareOverFloor, {{"sampler.type", "sobol"}, {"sampler.replicates", "4"}});
+    const crt::Film whole = render(backend(), scene, run);
+    REQUIRE(whole.replicates() == 4);
+    double largest = 0;
+    for (std::uint32_t replicate = 0; replicate < 4; ++replicate) {
+        std::optional<crt::Film> own;  // Replicates take turns.
+        for (std::uint32_t sample = replicate; sample < 32; sample += 4) {
+            Run one = run;
+            one.first_sample = sample;
+            one.samples = 1;
+            const crt::Film part = render(backend(), scene, one);
+            if (own) own->add(part);
+            else own = part;
+        }
+        for (std::uint32_t c = 0; c < 3; ++c) {
+            CAPTURE(replicate, c);
+            const double sum = whole.replicateSumOf(c, 0, 0, replicate);
+            CHECK(sum == Approx(own->sum(0, 0, c)).epsilon(1e-13));
+            largest = std::max(largest, std::abs(sum / whole.sum(0, 0, c) - 0.25));
+        }
+    }
+    CHECK(largest > 1e-6);  // They differ, or any order of them would pass.
 }

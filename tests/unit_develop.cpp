@@ -380,3 +380,37 @@ TEST_CASE("a film is black when no pixel has any of X, Y and Z", "[develop]") {
         CHECK_FALSE(isBlack(film));
     }
 }
+
+TEST_CASE("color_error is the spread of the replicates' colours, in the colours of the image", "[develop]") {
+    // Two replicates of three samples each, whose means are (1, 2, 3) and (2, 2, 7): the mean of both has a
+    // standard error of half their difference.
+    constexpr std::uint32_t aovs = kAovReplicates | kAovColorError;
+    Film film({1, 1, channelsFor(aovs, 2), aovs});
+    REQUIRE(film.replicates() == 2);
+    const auto set = [&film](std::uint32_t channel, double sum) { film.sums[2 * channel] = sum; };
+    const std::uint32_t first = firstChannel(aovs, kAovReplicates);
+    for (const auto& [channel, sum] : {std::pair{0u, 9.0}, {1u, 12.0}, {2u, 30.0}, {first, 6.0},
+                                       {first + 1, 3.0}, {first + 2, 9.0}})
+        set(channel, sum);
+    film.counts = {6};
+    film.samples.add({0, 6});
+    Development development;
+    development.color_space = ColorSpace::Xyz;
+    development.exposure_ev = 1;
+    const Image image = resolveImage(film, development, kAovColorError);
+    REQUIRE(image.channels == std::vector<std::string>{"R", "G", "B", "StdError.R", "StdError.G",
+                                                       "StdError.B"});
+    CHECK(image.pixels[0] == Approx(3));
+    CHECK(image.pixels[3] == Approx(1));
+    CHECK(image.pixels[4] == Approx(0).margin(1e-12));
+    CHECK(image.pixels[5] == Approx(4));
+    // In sRGB red is 3.2406 X - 1.5372 Y - 0.4986 Z, with the signs of the differences.
+    development.color_space = ColorSpace::LinearSrgb;
+    development.exposure_ev = 0;
+    const Image srgb = resolveImage(film, development, kAovColorError);
+    CHECK(srgb.pixels[3] == Approx(std::abs(3.2406 * 1 - 0.4986 * 4) / 2).epsilon(1e-3));
+    // A film without these channels cannot tell.
+    CHECK_THROWS_AS(resolveImage(Film({1, 1, channelsFor(kAovReplicates, 2), kAovReplicates}), development,
+                                 kAovColorError),
+                    Error);
+}

@@ -214,6 +214,28 @@ TEST_CASE("a pooled variance is that of equal pixels, never 0 amid noise, and ke
     CHECK(of_lost.degrees_of_freedom[10 * 20 + 11] == Approx(48));
 }
 
+TEST_CASE("a pixel whose neighbourhood has missed the light has the variance of a larger one",
+          "[pooled-tests]") {
+    // One noisy pixel in the first block of 8 × 8 of 24 × 16.
+    std::vector<double> variances(24 * 16, 0.0);
+    variances[2 * 24 + 3] = 64;
+    const std::vector<double> filled = crt::stats::variancesWithoutZeros(variances, 24, 16);
+    CHECK(filled[2 * 24 + 3] == 64);
+    CHECK(filled[7 * 24 + 7] == Approx(1));          // the block of 8 × 8
+    CHECK(filled[7 * 24 + 8] == Approx(0.25));       // that of 16 × 16
+    CHECK(filled[15 * 24 + 15] == Approx(0.25));
+    CHECK(filled[15 * 24 + 16] == Approx(1.0 / 6));  // all of the image
+    // Unknown variances stay unknown and add nothing.
+    variances[0] = std::numeric_limits<double>::infinity();
+    const std::vector<double> with_unknown = crt::stats::variancesWithoutZeros(variances, 24, 16);
+    CHECK(std::isinf(with_unknown[0]));
+    CHECK(with_unknown[1] == Approx(64.0 / 63));
+    // An image without any noise has none.
+    const std::vector<double> none(30, 0.0);
+    CHECK(crt::stats::variancesWithoutZeros(none, 6, 5) == none);
+    CHECK(crt::stats::variancesWithoutZeros({0, 3}, 2, 1) == std::vector<double>{1.5, 3});
+}
+
 TEST_CASE("a deviation over its pooled standard error has standard deviation 1", "[pooled-tests]") {
     // Normal noise, and each pixel's variance from two replicates. Over its own standard error the deviation
     // is Student's with one degree of freedom, which has no standard deviation at all.

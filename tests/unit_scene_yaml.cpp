@@ -132,7 +132,7 @@ TEST_CASE("the choices of the schema are in the order of the enumerations", "[sc
                                              {"primitive", kAovPrimitive},
                                              {"variance", kAovVariance},
                                              {"samples", kAovSamples},
-                                             {"error", kAovError}},
+                                             {"error", kAovError}, {"color_error", kAovColorError}},
         [](const std::string& name) {
             return parse("outputs: [{file: a.exr, aovs: [" + name + "]}]").outputs[0].aovs;
         });
@@ -159,7 +159,8 @@ TEST_CASE("every AOV is written by its name in a scene, alone and together", "[s
 
         // Read from the scene, resolved from a film that has what the scene needs: the channels that the row
         // names, and no others.
-        const std::uint32_t in_film = output.aovs & kAovsOfFirstHits;
+        std::uint32_t in_film = output.aovs & (kAovsOfFirstHits | kAovColorError);
+        if (in_film == kAovColorError) in_film |= kAovReplicates;
         const Image image =
             resolveImage(Film({2, 1, channelsFor(in_film), in_film}), Development{}, output.aovs);
         std::vector<std::string> channels = {"R", "G", "B"};

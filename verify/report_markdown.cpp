@@ -12,20 +12,25 @@
 namespace crt::verify {
 namespace {
 
-constexpr const char* kPreamble = R"(# Stability: what is asked of every backend
+/// {}: the number of cases that level merge adds.
+constexpr const char* kPreamble = R"(# Stability: the cases of crt verify
 
 <!-- Generated from the registry in verify/. Change it there, then run
-     crt verify --markdown --figures embree/verify.json --figures opencl/verify.json > docs/stability.md -->
+     crt verify --markdown --figures cuda/verify.json --figures embree/verify.json > docs/stability.md -->
 
-`crt verify` renders scenes whose answer is known and says whether the backend finds it. It takes any
-backend, also one that crt has never seen:
+`crt verify` renders scenes with known answers and reports whether the backend finds them. It takes any
+backend, including those that are not part of crt:
 
     crt verify --backend mine --plugin-path build --level merge -o report
 
-A figure that is estimated from samples passes when its 99.9 % interval lies within the tolerance, fails
-when it lies outside, and is inconclusive, which counts as failing, when it is too wide to tell. Exit code 7
-says that something failed. `commit` is the level for every commit, `merge` adds what takes minutes,
-`nightly` what takes longer.
+An estimated figure passes if its 99.9 % interval lies within the tolerance and fails if it lies outside. If
+the interval is too wide to decide, the case is inconclusive, which counts as failing. Exit code 7 says that
+something failed. `commit` is the level for every commit. Level `merge` adds {} cases and enlarges others;
+`nightly` enlarges more.
+
+Deviations are relative to the expected value; where that is 0, they are absolute. A tolerance may be
+absolute where the deviation is relative, as in G28 and H13. "–": not measured at this level. "Not
+applicable": the machine or program lacks something that the case needs; `verify.json` has the reason.
 )";
 
 std::string cell(const std::string& text) {
@@ -57,7 +62,9 @@ std::string markdownRow(const Case& c) {
 }
 
 std::string registryMarkdown(const std::vector<std::string>& suites) {
-    std::string text = kPreamble;
+    const auto merged = std::count_if(registry().begin(), registry().end(),
+                                      [](const Case& c) { return c.level == Level::Merge; });
+    std::string text = fmt::format(fmt::runtime(kPreamble), merged);
     std::vector<std::string> backends;
     std::map<std::pair<std::string, std::string>, std::string> figures;
     for (const std::string& suite : suites) {

@@ -99,7 +99,8 @@ std::optional<ErrorEstimate> Film::error() const {
                          .relative_rmse_lower = found->relative_rmse_95.lower,
                          .relative_rmse_upper = found->relative_rmse_95.upper,
                          .half_width_95 = found->half_width_95,
-                         .mean_luminance = found->mean_luminance};
+                         .mean_luminance = found->mean_luminance,
+                         .missing_light = identity.record->missing_light};
 }
 
 bool Film::errorWithin(double target) const {

@@ -12,6 +12,7 @@
 #include "compile/geometry.h"
 #include "compile/instances.h"
 #include "compile/lights.h"
+#include "compile/large_surfaces.h"
 #include "compile/materials.h"
 #include "compile/near_scene.h"
 #include "compile/near_surfaces.h"
@@ -268,6 +269,16 @@ void warnOfNearSurfaces(const Scene& scene, const CompiledScene& compiled) {
             "moves their edges by up to {:.1g} of their size: their light is wrong by the same factor; use "
             "point lights for them, or remove the distant objects",
             found.lights, found.asked, found.rounding);
+    std::vector<Vec3d> lights;
+    for (const PointLight& light : scene.point_lights)
+        if (shinesFromPoint(light.type)) lights.push_back(light.position);
+    if (const std::optional<LargeSurface> found = findLargeSurface(compiled, lights))
+        logWarning(
+            "{} is so large that rays leave it {:.2g} above the surface, and a light is {:.2g} away: the "
+            "light there is wrong by up to some {:.{}f} %; use smaller triangles near the light, or a disk "
+            "(crt divides a mesh that has one placement, does not emit and has no vertex colours)",
+            objectOf(scene, compiled, found->surface), found->clearance, found->height,
+            100 * found->error, found->error < 0.1 ? 1 : 0);
     if (scene.integrator.max_depth > 0)
         if (const NearSurfaces found = findNearSurfaces(searched); found.near > 0)
             logWarning(

@@ -63,7 +63,7 @@ std::uint64_t featuresOf(const Scene& scene, const kernel::CrtScene& header, con
     need(header.camera.lens_radius > 0, CRT_FEATURE_LENS);
     need(header.filter.count > 0, CRT_FEATURE_FILTER);
     f |= rowOf(scene.integrator.type).features;
-    need((header.aovs & kAovsOfFirstHits) != 0, CRT_FEATURE_AOV);
+    need((header.aovs & (kAovsOfFirstHits | kAovColorError)) != 0, CRT_FEATURE_AOV);
     need((header.aovs & kAovReplicates) != 0, CRT_FEATURE_REPLICATES);
     need(header.spectral_film.count > 0, CRT_FEATURE_SPECTRAL_FILM);
     return f;
@@ -131,7 +131,8 @@ LeftOut leftOut(const Scene& scene, const kernel::CrtScene& header, std::size_t 
         left_out("a tree of lights", fmt::format("fewer than {} lights lie at a place", kLightTreeLights));
     if (!has(CRT_FEATURE_LENS)) left_out("thin lens", "the camera is a pinhole");
     if (!has(CRT_FEATURE_FILTER)) left_out("pixel filter table", "the box filter is the pixel itself");
-    if (!has(CRT_FEATURE_AOV)) left_out("AOV buffers", "no output asks for first-hit AOVs");
+    if (!has(CRT_FEATURE_AOV))
+        left_out("AOV buffers", "no output asks for first-hit AOVs or for color_error");
     if (!has(CRT_FEATURE_REPLICATES))
         left_out("replicates", !isOfLight(scene) ? "integrator.type is a view" : "sampler.replicates is 1");
     if (!has(CRT_FEATURE_SPECTRAL_FILM))

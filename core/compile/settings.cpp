@@ -25,7 +25,18 @@ Vec3d normalise(const Vec3d& v) {
 
 /// Contents of the film: the channels of first hits that outputs need, those for its error, and splats.
 std::uint32_t filmAovs(const Scene& scene, std::uint32_t aovs) {
-    return (aovs & kAovsOfFirstHits) | (replicatesOf(scene) > 1 ? kAovReplicates : kAovSquares) |
+    const bool color_error = (aovs & kAovColorError) != 0;
+    if (color_error && (replicatesOf(scene) < 2 || splats(scene.integrator.type))) {
+        const auto asks = std::find_if(scene.outputs.begin(), scene.outputs.end(), [](const Output& output) {
+            return (output.aovs & kAovColorError) != 0;
+        });
+        throw Error(ErrorKind::Scene,
+                    "the AOV 'color_error' is the spread between replicates, of each pixel's own samples: "
+                    "'sampler.replicates' must be 2 or more, and the integrator one that does not splat",
+                    asks != scene.outputs.end() ? asks->place : SourcePlace());
+    }
+    return (aovs & (kAovsOfFirstHits | kAovColorError)) |
+           (replicatesOf(scene) > 1 ? kAovReplicates : kAovSquares) |
            (splats(scene.integrator.type) ? std::uint32_t{kAovSplats} : 0);
 }
 

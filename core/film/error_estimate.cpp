@@ -241,6 +241,21 @@ double LuminanceVariance::betweenReplicates(std::uint32_t x, std::uint32_t y) co
     return squares / dof_ / n;
 }
 
+double LuminanceVariance::ofColor(std::uint32_t x, std::uint32_t y, const Vec3d& weights) const {
+    const auto n = static_cast<double>(film_.samples.count());
+    const std::size_t pixel = std::size_t{y} * film_.shape().width + x;
+    if (!from_replicates_ || film_.counts[pixel] != film_.samples.count()) return kUnknown;
+    double squares = 0;
+    for (std::uint32_t r = 0; r < film_.replicates(); ++r) {
+        double deviation = 0;
+        for (std::uint32_t c = 0; c < 3; ++c)
+            deviation +=
+                weights[c] * (film_.replicateSumOf(c, x, y, r) - samples_[r] * film_.mean(x, y, c));
+        squares += deviation * deviation / samples_[r];
+    }
+    return squares / dof_ / n;
+}
+
 double LuminanceVariance::operator()(std::uint32_t x, std::uint32_t y) const {
     if (!(dof_ >= 1)) return kUnknown;
     const std::size_t pixel = std::size_t{y} * film_.shape().width + x;

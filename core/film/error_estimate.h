@@ -25,6 +25,8 @@ public:
     /// Of one pixel; infinite where it is not known: one sample says nothing about its own error, and zero
     /// would claim perfection.
     double operator()(std::uint32_t x, std::uint32_t y) const;
+    /// The same of weights · (X, Y, Z), of films with kAovColorError.
+    double ofColor(std::uint32_t x, std::uint32_t y, const Vec3d& weights) const;
     /// Degrees of freedom of one pixel's estimate.
     double degreesOfFreedom() const { return dof_; }
     /// True if it is the spread between replicates, false if between samples.

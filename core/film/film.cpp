@@ -201,8 +201,10 @@ double Film::splatSum(std::uint32_t x, std::uint32_t y, std::uint32_t channel) c
 }
 
 std::uint32_t FilmShape::replicates() const {
-    const std::uint32_t without = channelsFor(aovs & ~kAovReplicates);
-    return (aovs & kAovReplicates) != 0 && firstSpectral() > without ? firstSpectral() - without + 1 : 1;
+    const std::uint32_t without = channelsFor(aovs & ~(kAovReplicates | kAovColorError));
+    if ((aovs & kAovReplicates) == 0 || firstSpectral() <= without) return 1;
+    const std::uint32_t sums = (aovs & kAovColorError) != 0 ? 3 : 1;  // Of a replicate.
+    return (firstSpectral() - without) / sums + 1;
 }
 
 double Film::replicateSum(std::uint32_t x, std::uint32_t y, std::uint32_t replicate) const {
@@ -210,16 +212,24 @@ double Film::replicateSum(std::uint32_t x, std::uint32_t y, std::uint32_t replic
     if (!splats.empty())
         splatted =
             static_cast<double>(splatUnits(*this, x, y, CRT_SPLAT_SUM_OF(replicate))) / shape_.splat_scale;
+    return replicateSumOf(1, x, y, replicate) + splatted;
+}
+
+double Film::replicateSumOf(std::uint32_t component, std::uint32_t x, std::uint32_t y,
+                            std::uint32_t replicate) const {
     const std::uint32_t first = firstChannel(shape_.aovs, kAovReplicates), stored = replicates() - 1;
-    if (replicate < stored) return sum(x, y, first + replicate) + splatted;
+    const auto channelOf = [&](std::uint32_t r) {
+        return component == 1 ? first + r : first + stored + 2 * r + (component == 2 ? 1 : 0);
+    };
+    if (replicate < stored) return sum(x, y, channelOf(replicate));
     // In pairs: next to one bright sample in another replicate, this one's sum would be rounding.
     const double* pixel = &sums[(std::size_t{y} * shape_.width + x) * shape_.channels * 2];
-    double rest[2] = {pixel[2], pixel[3]};  // Y
+    double rest[2] = {pixel[2 * component], pixel[2 * component + 1]};
     for (std::uint32_t r = 0; r < stored; ++r) {
-        const double minus[2] = {-pixel[(first + r) * 2], -pixel[(first + r) * 2 + 1]};
+        const double minus[2] = {-pixel[channelOf(r) * 2], -pixel[channelOf(r) * 2 + 1]};
         addPair(rest, minus);
     }
-    return rest[0] + rest[1] + splatted;
+    return rest[0] + rest[1];
 }
 
 std::uint32_t FilmShape::splatWords() const {

@@ -84,6 +84,9 @@ public:
     /// asked of it; error_estimate.h makes error bars of them.
     std::uint32_t replicates() const { return shape_.replicates(); }
     double replicateSum(std::uint32_t x, std::uint32_t y, std::uint32_t replicate) const;
+    /// The same of X (0), Y (1) or Z (2), of films with kAovColorError.
+    double replicateSumOf(std::uint32_t component, std::uint32_t x, std::uint32_t y,
+                          std::uint32_t replicate) const;
     std::uint64_t replicateSamples(std::uint32_t replicate) const;
     /// Samples that were NaN or infinite and were dropped.
     std::uint64_t invalidSamples() const;

@@ -214,6 +214,7 @@ SceneTrait lightsTrait(const Scene& scene) {
                 for (const double x : axis) digest.add(x);
         };
         if (const auto& image = scene.environment->image) {
+            digest.add(std::vector<char>(image->file.begin(), image->file.end()));
             digest.add(image->scale);
             add_axes(image->axes);
         }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <utility>
 
 namespace crt::stats {
 namespace {
@@ -73,6 +74,41 @@ PooledVariances pooledVariances(std::span<const double> own, std::uint32_t width
         pooled.degrees_of_freedom[i] = dof * std::clamp(equal, 1.0, std::max(1.0, pixels * known[i]));
     }
     return pooled;
+}
+
+std::vector<double> variancesWithoutZeros(std::vector<double> variances, std::uint32_t width,
+                                          std::uint32_t height) {
+    struct Level {
+        std::uint32_t across, down;
+        std::vector<double> sums, pixels;  ///< Of a block; infinite variances are in neither.
+    };
+    Level level{width, height, variances, std::vector<double>(variances.size(), 1)};
+    for (std::size_t i = 0; i < variances.size(); ++i)
+        if (!std::isfinite(variances[i])) level.sums[i] = level.pixels[i] = 0;
+    constexpr unsigned kFirst = 3;  // Blocks of 8 × 8.
+    for (unsigned shift = 1; level.across * level.down > 1; ++shift) {
+        Level next{(level.across + 1) / 2, (level.down + 1) / 2, {}, {}};
+        next.sums.resize(std::size_t{next.across} * next.down);
+        next.pixels.resize(next.sums.size());
+        for (std::uint32_t y = 0; y < level.down; ++y)
+            for (std::uint32_t x = 0; x < level.across; ++x) {
+                const std::size_t from = std::size_t{y} * level.across + x;
+                const std::size_t to = std::size_t{y / 2} * next.across + x / 2;
+                next.sums[to] += level.sums[from];
+                next.pixels[to] += level.pixels[from];
+            }
+        level = std::move(next);
+        if (shift < kFirst && level.across * level.down > 1) continue;
+        bool zeros = false;
+        for (std::size_t i = 0; i < variances.size(); ++i) {
+            if (variances[i] != 0) continue;
+            const std::size_t block = (i / width >> shift) * level.across + (i % width >> shift);
+            if (level.sums[block] > 0) variances[i] = level.sums[block] / level.pixels[block];
+            else zeros = true;
+        }
+        if (!zeros) break;
+    }
+    return variances;
 }
 
 }  // namespace crt::stats

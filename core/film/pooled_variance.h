@@ -31,4 +31,11 @@ struct PooledVariances {
 PooledVariances pooledVariances(std::span<const double> own, std::uint32_t width, std::uint32_t height,
                                 double dof);
 
+/// `variances` ([height][width], a separate variance of each pixel) with no 0 unless all are. Where all
+/// samples of a pixel and of its neighbourhood have missed a light, 0 would say that all is known. Such a
+/// pixel gets the mean over the smallest block that contains it and has a variance, of blocks of 8, 16,
+/// 32, … pixels a side.
+std::vector<double> variancesWithoutZeros(std::vector<double> variances, std::uint32_t width,
+                                          std::uint32_t height);
+
 }  // namespace crt::stats

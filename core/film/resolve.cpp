@@ -82,6 +82,7 @@ struct PixelNoise {
         for (std::uint32_t y = 0; y < height; ++y)
             for (std::uint32_t x = 0; x < width; ++x) own[std::size_t{y} * width + x] = variance(x, y);
         pooled = stats::pooledVariances(own, width, height, degrees_of_freedom);
+        pooled.variances = stats::variancesWithoutZeros(std::move(pooled.variances), width, height);
     }
     double standardError(std::size_t pixel) const { return std::sqrt(pooled.variances[pixel]); }
     double halfWidth(std::size_t pixel) const {
@@ -89,6 +90,24 @@ struct PixelNoise {
         return quantile(pooled.degrees_of_freedom[pixel]) * standardError(pixel);
     }
 };
+
+/// Standard errors of R, G and B, which are `color` times X, Y and Z.
+std::array<std::vector<double>, 3> colorErrors(const Film& film, const Matrix3d& color) {
+    const LuminanceVariance variance(film);
+    const std::uint32_t width = film.shape().width, height = film.shape().height;
+    std::array<std::vector<double>, 3> errors;
+    for (std::size_t c = 0; c < 3; ++c) {
+        std::vector<double> own(std::size_t{width} * height);
+        for (std::uint32_t y = 0; y < height; ++y)
+            for (std::uint32_t x = 0; x < width; ++x)
+                own[std::size_t{y} * width + x] = variance.ofColor(x, y, color[c]);
+        errors[c] = stats::variancesWithoutZeros(
+            stats::pooledVariances(own, width, height, variance.degreesOfFreedom()).variances, width,
+            height);
+        for (double& error : errors[c]) error = std::sqrt(error);
+    }
+    return errors;
+}
 
 }  // namespace
 
@@ -98,7 +117,7 @@ Image resolveImage(const Film& film, const Development& development, std::uint32
     if (spectral.count() > shape.spectral)
         throw Error(ErrorKind::Internal, "an image needs more spectral channels than its film has");
     for (const AovRow& row : kAovRows)
-        if ((aovs & kAovsOfFirstHits & ~shape.aovs & row.aov) != 0)
+        if ((aovs & (kAovsOfFirstHits | kAovColorError) & ~shape.aovs & row.aov) != 0)
             throw Error(ErrorKind::Usage,
                         fmt::format("an output needs the {} plane, but the film was rendered without it",
                                     row.name));
@@ -134,6 +153,8 @@ Image resolveImage(const Film& film, const Development& development, std::uint32
         for (std::string& name : exrNames(row)) names.push_back(std::move(name));
     }
 
+    std::array<std::vector<double>, 3> color_errors;
+    if ((aovs & kAovColorError) != 0) color_errors = colorErrors(film, color);
     std::optional<PixelNoise> noise;
     if ((aovs & (kAovVariance | kAovError)) != 0) {
         noise.emplace(film);
@@ -174,6 +195,9 @@ Image resolveImage(const Film& film, const Development& development, std::uint32
                         film.counts[pixel], std::numeric_limits<std::uint32_t>::max()));
                     break;
                 case kAovError: add(noise->standardError(pixel) * gain); break;
+                case kAovColorError:
+                    append({color_errors[0][pixel], color_errors[1][pixel], color_errors[2][pixel]});
+                    break;
             }
         }
         if ((aovs & kAovError) != 0) add(noise->halfWidth(pixel) * gain);

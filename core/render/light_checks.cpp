@@ -2,6 +2,8 @@
 
 #include "base/log.h"
 #include "base/vec3d.h"
+#include "compile/placements.h"
+#include "render/deep_glass.h"
 #include "scene/missing_light.h"
 
 #include <fmt/format.h>
@@ -14,11 +16,6 @@
 
 namespace crt {
 namespace {
-
-Vec3d placed(const Matrix4d& m, const Vec3d& p) {
-    return {m[0] * p[0] + m[1] * p[1] + m[2] * p[2] + m[3], m[4] * p[0] + m[5] * p[1] + m[6] * p[2] + m[7],
-            m[8] * p[0] + m[9] * p[1] + m[10] * p[2] + m[11]};
-}
 
 bool mirrors(const Matrix4d& m) {
     return dot(Vec3d{m[0], m[1], m[2]}, cross(Vec3d{m[4], m[5], m[6]}, Vec3d{m[8], m[9], m[10]})) < 0;
@@ -49,7 +46,7 @@ std::vector<Face> oneSidedFaces(const Scene& scene, const Object& object) {
         for (const Matrix4d& transform : object.transforms) {
             std::array<Vec3d, 3> p;
             for (std::size_t v = 0; v < 3; ++v)
-                p[v] = placed(transform, mesh.positions[mesh.triangles[t][v]]);
+                p[v] = transformPoint(transform, mesh.positions[mesh.triangles[t][v]]);
             Vec3d normal = cross(p[1] - p[0], p[2] - p[0]);
             const double norm = length(normal);
             if (!(norm > 0)) continue;
@@ -75,7 +72,8 @@ public:
             for (const Matrix4d& transform : object.transforms) {
                 if (points_ += mesh.positions.size(); points_ > kMostPoints) return;
                 for (const Vec3d& p : mesh.positions)
-                    for (const double x : placed(transform, p)) largest_ = std::max(largest_, std::abs(x));
+                    for (const double x : transformPoint(transform, p))
+                        largest_ = std::max(largest_, std::abs(x));
             }
         }
     }
@@ -93,12 +91,12 @@ public:
         for (const Object& object : scene_.objects)
             for (const Matrix4d& transform : object.transforms)
                 for (const Vec3d& p : scene_.meshes[object.mesh].positions) {
-                    if (++looks_ > kMostLooks || inFront(placed(transform, p), 0)) return false;
+                    if (++looks_ > kMostLooks || inFront(transformPoint(transform, p), 0)) return false;
                 }
         for (const Object& object : scene_.objects)
             for (const Matrix4d& transform : object.transforms)
                 if (object.shape &&
-                    inFront(placed(transform, {0, 0, 0}), radiusAround(*object.shape, transform)))
+                    inFront(transformPoint(transform, {0, 0, 0}), radiusAround(*object.shape, transform)))
                     return false;
         return true;
     }
@@ -193,6 +191,11 @@ void warnOfIdleLamps(const Scene& scene) {
 void warnOfMissingLight(const Scene& scene) {
     if (const std::vector<std::string> missing = missingLight(scene); !missing.empty())
         logWarning("{}", missingLightText(missing, scene));
+    if (const std::optional<DeepGlass> deep = deepGlass(scene))
+        logWarning("the image lacks light behind glass in about {:.0f} % of the view: a ray meets up to {} "
+                   "surfaces of glass in a row, and 'max_depth: {}' ends its paths there; the stated error "
+                   "does not include it; set 'max_depth' to {} or more",
+                   100 * deep->share, deep->surfaces, scene.integrator.max_depth, 2 * deep->surfaces + 2);
 }
 
 bool isBlack(const Film& film) {

@@ -17,7 +17,7 @@ std::vector<std::string> idleLamps(const Scene& scene);
 /// One warning for each of them.
 void warnOfIdleLamps(const Scene& scene);
 
-/// Warns of light that the image lacks however long it renders (scene/missing_light.h).
+/// Warns of light that the image lacks however long it renders (scene/missing_light.h, deep_glass.h).
 void warnOfMissingLight(const Scene& scene);
 
 /// Has no pixel got any light?

@@ -81,11 +81,13 @@ constexpr std::uint32_t firstChannel(std::uint32_t aovs, std::uint32_t aov) {
     return 0;
 }
 
-/// Channels of a film that holds `aovs`, among them the sums of all replicates but the last.
+/// Channels of a film that holds `aovs`, among them the sums of all replicates but the last: of Y, and with
+/// kAovColorError of X and Z.
 constexpr std::uint32_t channelsFor(std::uint32_t aovs, std::uint32_t replicates = CRT_REPLICATES_MAX) {
     std::uint32_t channels = CRT_CHANNELS_BASE;
     for (const AovRow& row : kAovRows)
         if (aovs & row.aov) channels += row.aov == kAovReplicates ? replicates - 1 : row.width;
+    if (aovs & kAovColorError) channels += 2 * (replicates - 1);
     return channels;
 }
 

@@ -2,6 +2,7 @@
 
 #include "base/error.h"
 #include "base/log.h"
+#include "render/light_checks.h"
 #include "scene/aov.h"
 #include "view/http_server.h"
 #include "view/planes.h"
@@ -80,6 +81,7 @@ void Viewer::hear(LogLevel level, std::string_view message) {
 }
 
 void Viewer::takeScene(std::shared_ptr<const Scene> scene) {
+    warnOfMissingLight(*scene);
     const std::lock_guard lock(mutex_);
     // A camera that hands have moved stays, unless the file has another one now.
     if (!scene_ || !(poseOf(scene_->camera) == poseOf(scene->camera))) pose_ = poseOf(scene->camera);

@@ -61,6 +61,8 @@ class Result:
     def __repr__(self):
         error = self.error
         known = f", error {error.half_width_95:.2%}" if error else ""
+        if error and error.missing_light:
+            known += " + missing light"
         return (f"<crt.Result {self.film.width} x {self.film.height}, {self.film.samples} samples a pixel"
                 f"{known}, ended by {self.stop}>")
 

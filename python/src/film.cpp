@@ -65,9 +65,9 @@ crt::Image develop(const crt::Film& film, bool for_display, std::optional<double
 
 nb::str describeError(const crt::ErrorEstimate& error) {
     return nb::str(
-               "<crt.ErrorEstimate {:.3g} % ({:.3g} to {:.3g} %) expected; this image: at most {:.3g} %>")
+               "<crt.ErrorEstimate {:.3g} % ({:.3g} to {:.3g} %) expected; this image: at most {:.3g} %{}>")
         .format(100 * error.relative_rmse, 100 * error.relative_rmse_lower, 100 * error.relative_rmse_upper,
-                100 * error.half_width_95);
+                100 * error.half_width_95, error.missing_light.empty() ? "" : " + missing light");
 }
 
 nb::str describeFilm(const crt::Film& film) {
@@ -85,12 +85,14 @@ void bindFilm(nb::module_& module) {
         "A film's estimate of its own error, relative to the mean luminance:\n"
         "relative_rmse with relative_rmse_lower and _upper is the expected error,\n"
         "over seeds, with its 95 % interval; half_width_95 is what the error of\n"
-        "this image is at most, with a probability of 95 %.")
+        "this image is at most, with a probability of 95 %. missing_light lists\n"
+        "light that no sample finds and no error includes; empty: none is known.")
         .def_ro("relative_rmse", &crt::ErrorEstimate::relative_rmse)
         .def_ro("relative_rmse_lower", &crt::ErrorEstimate::relative_rmse_lower)
         .def_ro("relative_rmse_upper", &crt::ErrorEstimate::relative_rmse_upper)
         .def_ro("half_width_95", &crt::ErrorEstimate::half_width_95)
         .def_ro("mean_luminance", &crt::ErrorEstimate::mean_luminance)
+        .def_ro("missing_light", &crt::ErrorEstimate::missing_light)
         .def("__repr__", &describeError);
     nb::class_<crt::Film>(module, "Film",
                           "Sums of samples: the result of a render, from which images are made.")

@@ -43,6 +43,21 @@ def test_result_is_numpy(box):
     assert np.abs(y - result.film.xyz[..., 1]).max() < 1e-4 * result.film.xyz[..., 1].max()
 
 
+def test_an_error_lists_missing_light(box, tmp_path):
+    """No sample finds the light of a point light that a mirror reflects."""
+    assert crt.render(box, spp=64, backend="embree").error.missing_light == []
+    scene = tmp_path / "mirrored.yaml"
+    red = "{type: diffuse, reflectance: {rgb: [0.7, 0.1, 0.1]}}"
+    scene.write_text(BOX.replace(red, "{type: mirror, reflectance: 0.9}") +
+                     "lights: [{type: point, position: [1, 1.5, 1], power_w: 5}]\n")
+    result = crt.render(scene, spp=64, backend="embree")
+    missing = result.error.missing_light
+    assert len(missing) == 1 and "point" in missing[0]
+    assert "+ missing light" in repr(result) and "+ missing light" in repr(result.error)
+    result.save(tmp_path / "mirrored.crtfilm")
+    assert crt.Film.load(str(tmp_path / "mirrored.crtfilm")).error.missing_light == missing
+
+
 def test_rows_go_from_the_top(box):
     """The floor fills the lower rows, above its edge there is nothing but the lamp's lower side."""
     rows = crt.render(box, spp=16, backend="embree").film.xyz[..., 1].mean(axis=1)

@@ -208,6 +208,7 @@ class Info(CliTest):
             "variance": "OwnVariance.Y, Variance.Y",
             "samples": "sampleCount",
             "error": "HalfWidth95.Y, OwnVariance.Y, StdError.Y",
+            "color_error": "StdError.R, StdError.G, StdError.B",
         }
         schema = json.loads(self.crt("schema").stdout)
         listed = re.findall(r'"aovs".*?"enum": (\[.*?\])', json.dumps(schema))

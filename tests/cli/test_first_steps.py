@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """First experiences of a new user: versions, names from other programs, images that are overexposed or
-black, exposures, units, and scenes of other renderers.
+black, exposures, units, light that no path finds, and scenes of other renderers.
 
     test_first_steps.py CRT CONFIG_DIR FAKE_PLUGIN_DIR [unittest arguments]
 """
@@ -13,6 +13,7 @@ import struct
 
 import harness
 from harness import LIT, SCENE, CliTest, LightTest, read_pfm
+from image_headers import exr_header, png_texts
 
 WHITE_CD_M2 = 72983.5  # Of a pixel with Y = 1.
 
@@ -30,6 +31,30 @@ objects:
     transform: [{{rotate: {{axis: [1, 0, 0], angle_deg: -90}}}}]
 """
 BULB_Y = 800 / (4 * math.pi) / 2 ** 2 * 0.5 / math.pi / WHITE_CD_M2
+
+# A ball on a floor below a lamp: the first field is the ball's material, the second the lamp.
+BALL = """\
+crt: 1
+camera: {{position: [0, 1, -4], target: [0, 0.5, 0], fov: 40}}
+film: {{resolution: [24, 16]}}
+materials:
+  grey: {{type: diffuse, reflectance: 0.5}}
+  it: {{{0}}}
+lights: [{{{1}}}]
+objects:
+  - {{sphere: {{radius: 0.5}}, material: it, transform: [{{translate: [0, 0.5, 0]}}]}}
+  - rectangle: {{size: [4, 4]}}
+    material: grey
+    transform: [{{rotate: {{axis: [1, 0, 0], angle_deg: -90}}}}]
+"""
+GLASS = "type: dielectric, ior: 1.5"
+MIRROR = "type: mirror, reflectance: 1"
+GREY = "type: diffuse, reflectance: 0.5"
+POINT = "type: point, position: [0, 2, 0], radiant_intensity: 1"
+SPOT = "type: spot, position: [0, 2, 0], direction: [0, -1, 0], cone_angle_deg: 60, radiant_intensity: 1"
+SUN = "type: sun, direction: [0, -1, 0], radiance: 1"
+NOT_FOUND = "light of point lights that smooth glass refracts or reflects"
+ERROR = r"error [\d.]+ % \([\d.]+-[\d.]+\) expected; this image: at most [\d.]+ %"
 
 
 class Names(CliTest):
@@ -145,6 +170,80 @@ class Units(LightTest):
                                                                             "target: [0, 9, 0]"))
         run = self.crt("narrow.yaml", "-b", self.backend, "-o", "a.pfm")
         self.assertIn("'fov' is in degrees, and the camera sees 0.7 of them", run.stderr)
+
+
+class MissingLight(CliTest):
+    """No path finds the light of a lamp without a size that a glass ball passes on. crt derives this from
+    the scene, so the fake backend renders it here."""
+
+    def render(self, material, light=POINT, *options):
+        self.write("ball.yaml", BALL.format(material, light))
+        return self.crt("ball.yaml", "-b", "fake", "--spp", "16", "-o", "a.exr", "-o", "a.png", "-o",
+                        "a.crtfilm", *options).stderr
+
+    def warnings(self, said):
+        return [line for line in said.splitlines() if line.startswith("crt: warning:")]
+
+    def test_a_warning_names_the_light_and_the_surface(self):
+        for material, light, lacks in (
+            (GLASS, POINT, NOT_FOUND),
+            (MIRROR, POINT, "light of point lights that mirrors and smooth metals reflect"),
+            (GLASS, SPOT, "light of spot lights that smooth glass refracts or reflects"),
+        ):
+            with self.subTest(lacks=lacks):
+                warnings = self.warnings(self.render(material, light))
+                self.assertEqual(len(warnings), 1, warnings)
+                self.assertIn(f"the image lacks {lacks}: ", warnings[0])
+                self.assertIn("the stated error does not include it; use an emitting sphere", warnings[0])
+
+    def test_a_warning_of_a_small_depth_names_the_setting(self):
+        for depth, warned in ((2, True), (3, False)):
+            said = self.render(GLASS, SUN, "--set", f"integrator.max_depth={depth}")
+            self.assertEqual("surfaces behind a glass body" in said, warned, said)
+            self.assertEqual("; raise 'max_depth'" in said, warned, said)
+
+    def test_the_report_lists_it(self):
+        self.render(GLASS)
+        self.assertEqual(self.report("a.report.json")["missing_light"], [NOT_FOUND])
+
+    def test_images_keep_it(self):
+        self.render(GLASS)
+        self.assertEqual(exr_header(self.path("a.exr"))["crt/missingLight"], ("string", NOT_FOUND))
+        self.assertEqual(png_texts(self.path("a.png"))["crt/missingLight"], NOT_FOUND)
+        self.assertRegex(self.crt("info", "a.exr").stdout, f"(?m)^  crt/missingLight +{NOT_FOUND}$")
+
+    def test_films_keep_it_and_give_it_to_their_images(self):
+        self.render(GLASS)
+        self.assertRegex(self.crt("info", "a.crtfilm").stdout, f"(?m)^  missing +{NOT_FOUND}$")
+        self.crt("ball.yaml", "-b", "fake", "--samples", "16:32", "-o", "b.crtfilm")
+        self.crt("merge", "a.crtfilm", "b.crtfilm", "-o", "c.crtfilm")
+        self.assertRegex(self.crt("info", "c.crtfilm").stdout, f"(?m)^  missing +{NOT_FOUND}$")
+        os.remove(self.path("ball.yaml"))
+        for film in ("a", "c"):
+            self.crt("develop", f"{film}.crtfilm", "-o", "d.exr")
+            self.assertEqual(exr_header(self.path("d.exr"))["crt/missingLight"], ("string", NOT_FOUND))
+
+    def test_it_is_added_to_each_error_that_is_printed(self):
+        said = self.render(GLASS)
+        self.assertRegex(said, rf"(?m)^crt: info: 16 samples per pixel, .*, {ERROR} \+ missing light$")
+        developed = self.crt("develop", "a.crtfilm", "-o", "b.exr").stderr
+        self.assertRegex(developed, rf"(?m)16 samples per pixel, {ERROR} \+ missing light$")
+        info = self.crt("info", "a.crtfilm").stdout
+        self.assertRegex(info, rf"(?m)^  error +{ERROR[6:]} \+ missing light$")
+
+    def test_of_the_same_scene_without_glass_there_is_none(self):
+        said = self.render(GREY)
+        self.assertEqual(self.warnings(said), [])
+        self.assertEqual(self.report("a.report.json")["missing_light"], [])
+        developed = self.crt("develop", "a.crtfilm", "-o", "b.exr").stderr
+        info = "".join(self.crt("info", file).stdout for file in ("a.exr", "b.exr", "a.crtfilm"))
+        for name in ("a.exr", "b.exr"):
+            self.assertNotIn("crt/missingLight", exr_header(self.path(name)))
+        self.assertNotIn("crt/missingLight", png_texts(self.path("a.png")))
+        self.assertNotIn("issing", said + developed + info)
+        self.assertNotIn("lacks", said)
+        for line in (said, developed):
+            self.assertRegex(line, f"(?m){ERROR}$")
 
 
 class OtherRenderers(CliTest):

@@ -24,6 +24,8 @@ struct ErrorEstimate {
     /// With probability 95 % the error that this image really has is at most this.
     double half_width_95 = 0;
     double mean_luminance = 0;
+    /// Light that no sample finds and no error includes, in words (docs/error.md); empty: none is known.
+    std::vector<std::string> missing_light;
 };
 
 struct DevelopOptions {

@@ -295,7 +295,8 @@ void ConfigurationRun::fillMaps(std::uint64_t samples) {
     for (std::size_t p = 0; p < pixels; ++p)
         variances[p] = variances[p] / (mean * mean) + std::pow(double{last_error_.values[p]}, 2);
     const double dof = std::max(1, replicatesOf(scene_) - 1);
-    const std::vector<double> pooled = stats::pooledVariances(variances, c.width, c.height, dof).variances;
+    const std::vector<double> pooled = stats::variancesWithoutZeros(
+        stats::pooledVariances(variances, c.width, c.height, dof).variances, c.width, c.height);
     for (std::size_t p = 0; p < pixels; ++p) {
         const double difference = (luminance[p] - truth[p]) / mean;
         c.maps.error.values[p] = static_cast<float>(std::abs(difference));

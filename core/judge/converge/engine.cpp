@@ -17,6 +17,7 @@
 #include "judge/converge/quantity_text.h"
 #include "judge/converge/report_maps.h"
 #include "judge/converge/variants.h"
+#include "scene/missing_light.h"
 #include "scene/yaml/yaml_reader.h"
 
 #include <fmt/format.h>
@@ -212,7 +213,8 @@ private:
                     "{}: no reference was given; crt made one in {} of the {} of --time: {} samples per "
                     "pixel on {}{}",
                     names_[s], durationText(made->seconds), durationText(request_.seconds), made->samples,
-                    backend, made->error ? ", its own " + crt::errorText(*made->error) : "");
+                    backend,
+                    made->error ? ", its own " + crt::errorText(*made->error, made->light_is_missing) : "");
                 went = fmt::format("crt spent {} of the {} of --time on one", durationText(made->seconds),
                                    durationText(request_.seconds));
             }
@@ -224,6 +226,9 @@ private:
                 names_[s], went, backend));
         }
         for (std::size_t s = 0; s < scenes_.size(); ++s) {
+            if (const auto lost = missingLight(scenes_[s]); !lost.empty())
+                run_.notes.push_back(
+                    fmt::format("{}: {}", names_[s], missingLightText(lost, scenes_[s])));
             ReferenceInfo none;
             none.scene = names_[s];
             run_.references.push_back(references_[s] ? references_[s]->info : none);

@@ -12,6 +12,7 @@
 #include "image/image_io.h"
 #include "judge/converge/files.h"
 #include "render/brightest_path.h"
+#include "render/light_checks.h"
 #include "render/output_guard.h"
 #include "render/sampling.h"
 #include "render/session.h"
@@ -19,6 +20,7 @@
 #include "scene/yaml/yaml_reader.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -158,7 +160,7 @@ int makeReference(const ReferenceRequest& request, Watch& watch) {
     if (!made) return watch.stopRequested()->exit_code;
     logInfo("{}: {} samples per pixel in {} eighths, {}, {}", request.output, made->samples, kFolds,
             made->estimator, durationText(made->seconds));
-    if (made->error) logInfo("its own {}", errorText(*made->error));
+    if (made->error) logInfo("its own {}", errorText(*made->error, made->light_is_missing));
     if (made->error && made->error->relative_rmse > 0.02)
         logWarning(
             "the reference is noisy; its variance is subtracted from errors, but more --time, or "
@@ -262,6 +264,8 @@ std::optional<MadeReference> renderReference(Scene scene, const ReferenceRequest
     if (sampled && scene.integrator.nee && !request.same_estimator)
         logInfo("light sampling stays on, because only it finds point, spot, IES, beam and directional "
                 "lights");
+    warnOfMissingLight(scene);
+    const std::vector<std::string> missing = missingLight(scene);
     Session session(request.backend, request.integrator);
     const std::optional<RenderedFolds> folds = renderFolds(scene, session, request, watch);
     if (!folds) return std::nullopt;
@@ -273,10 +277,12 @@ std::optional<MadeReference> renderReference(Scene scene, const ReferenceRequest
     file.metadata.emplace_back(kEstimatorKey, estimatorText(scene));
     file.metadata.emplace_back("crt/backend", session.backend().name);
     file.metadata.emplace_back("crt/seed", std::to_string(scene.sampler.seed));
+    if (!missing.empty())
+        file.metadata.emplace_back("crt/missingLight", fmt::format("{}", fmt::join(missing, "; ")));
     writeImage(request.output, OutputFormat::Exr, file);
     const double seconds = rendering.seconds();
     return MadeReference{folds->film.samples.count(), estimatorText(scene), seconds,
-                         estimateError(folds->film, PixelSet::All, folds->paths)};
+                         estimateError(folds->film, PixelSet::All, folds->paths), !missing.empty()};
 }
 
 Reference readReference(const std::string& text, const Scene& scene) {

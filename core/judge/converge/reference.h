@@ -45,6 +45,7 @@ struct MadeReference {
     std::string estimator;
     double seconds = 0;
     std::optional<ErrorEstimate> error;
+    bool light_is_missing = false;  ///< Light that the error does not include (scene/missing_light.h).
 };
 std::optional<MadeReference> renderReference(Scene scene, const ReferenceRequest& request, Watch& watch);
 

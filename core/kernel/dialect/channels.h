@@ -13,7 +13,9 @@
  * output without film channels: IDS is the film's plane of primitive ids, SPLATS that of splats, FILM is
  * made of the film when it is resolved. TYPE is FLOAT or UINT.
  *
- * A spectral film has its bins and the responses of its sensors behind all of these: CrtSpectralFilm.
+ * COLOR_ERROR has film channels all the same, behind the replicates: X and Z of the first replicate, of the
+ * second, and so on; as with Y, not of the last. A spectral film has its bins and the responses of its
+ * sensors behind all of these: CrtSpectralFilm.
  *
  * An empty name: no output. EXR channels are separated by commas; those of the CRT_CHANNEL_LIST are floats.
  * A bit never changes its meaning, because film files hold the mask.
@@ -33,7 +35,8 @@
     P(4, VARIANCE, Variance, FLOAT, FILM, "variance", "Variance.Y")                                \
     P(5, SAMPLES, Samples, UINT, FILM, "samples", "sampleCount")                                   \
     P(9, SPLATS, Splats, UINT, SPLATS, "", "")                                                     \
-    P(7, ERROR, Error, FLOAT, FILM, "error", "StdError.Y")
+    P(7, ERROR, Error, FLOAT, FILM, "error", "StdError.Y")                                         \
+    P(10, COLOR_ERROR, ColorError, FLOAT, FILM, "color_error", "StdError.R,StdError.G,StdError.B")
 
 #define CRT_CHANNEL_ENUM(bit, NAME, Name, stem, width, SOURCE, name, exr) CRT_AOV_##NAME = 1 << bit,
 #define CRT_PLANE_ENUM(bit, NAME, Name, TYPE, SOURCE, name, exr) CRT_AOV_##NAME = 1 << bit,
@@ -52,6 +55,7 @@ enum CrtAov { CRT_CHANNEL_LIST(CRT_CHANNEL_ENUM) CRT_PLANE_LIST(CRT_PLANE_ENUM) 
 
 /* Of a film with everything. */
 #define CRT_CHANNEL_WIDTH(bit, NAME, Name, stem, width, SOURCE, name, exr) +(width)
-#define CRT_CHANNELS_MAX (CRT_CHANNELS_BASE CRT_CHANNEL_LIST(CRT_CHANNEL_WIDTH))
+#define CRT_CHANNELS_MAX \
+    (CRT_CHANNELS_BASE CRT_CHANNEL_LIST(CRT_CHANNEL_WIDTH) + 2u * (CRT_REPLICATES_MAX - 1u))
 
 #endif

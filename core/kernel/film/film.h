@@ -138,8 +138,16 @@ CRT_FN void crt_film_add_sample(const CrtContext *ctx, CrtFilmPixel *pixel, vec4
             crt_film_add(pairs + 2u * scene->square_channel, luminance * luminance);
         if (CRT_HAS(REPLICATES) && scene->replicate_shift != 0u) {
             const u32 replicate = crt_replicate(crt_film_next(pixel), scene->replicate_shift);
-            if (replicate + 1u < 1u << scene->replicate_shift)
+            const u32 stored = (1u << scene->replicate_shift) - 1u;
+            if (replicate < stored) {
                 crt_film_add(pairs + 2u * (scene->replicate_channel + replicate), luminance);
+                if (CRT_HAS(AOV) && (scene->aovs & CRT_AOV_COLOR_ERROR) != 0u) {
+                    CRT_GLOBAL f64 *others =
+                        pairs + 2u * (scene->replicate_channel + stored + 2u * replicate);
+                    crt_film_add(others, (f64)V4X(xyz));
+                    crt_film_add(others + 2, (f64)V4Z(xyz));
+                }
+            }
         }
         if (CRT_HAS(AOV)) {
             if (scene->channels > CRT_CHANNELS_BASE) crt_film_add_aovs(ctx, first, wavelengths, pairs);

@@ -359,10 +359,11 @@ std::string Writer::lightsText() const {
             if (!(inner >= 0 && inner <= outer && outer > 0 && outer <= std::numbers::pi))
                 file_.fail(pointer + "/spot", "its inner angle must be between 0 and the outer one, and the "
                                               "outer one at most pi");
+            constexpr double kLeast_deg = 0.01;  // As scenes take it.
             keys = fmt::format(
                 "type: spot, {}, direction: {}, cone_angle_deg: {}, penumbra_deg: {}, "
                 "luminous_intensity_cd: {}",
-                position, yamlList(way), yamlNumber(outer * kDegrees),
+                position, yamlList(way), yamlNumber(std::max(outer * kDegrees, kLeast_deg)),
                 yamlNumber((outer - inner) * kDegrees), yamlNumber(amount));
         } else {
             losses_.add("a light of an unknown type");

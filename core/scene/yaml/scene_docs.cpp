@@ -166,7 +166,7 @@ constexpr std::string_view kIntroduction = R"(# Scene files
 <!-- Generated from the table in core/scene/yaml/scene_schema.cpp. Change it there, then run
      CRT_UPDATE_DOCS=1 unit_tests "docs/scene.md is what the schema says" -->
 
-A scene is one YAML file. The smallest says `crt: 1`; this one shows a floor under a lamp:
+A scene is one YAML file. The smallest contains only `crt: 1`; this one shows a floor under a light:
 
 ```yaml
 crt: 1
@@ -249,7 +249,8 @@ as OpenEXR's attribute `whiteLuminance` (`crt info a.exr` prints it), in each of
 colour spaces; where `apply_to_float` multiplies the values by 2^ev, it is divided by that. Spectral bins
 are radiance, in W·m⁻²·sr⁻¹·nm⁻¹. The illuminance of a matt surface of reflectance
 ρ is π / ρ times its luminance. PNG and PPM are for screens: exposed, balanced, sRGB-encoded and
-clipped, so they do not hold radiance. The mean luminance in `report.json` is in both units.
+clipped, so they do not hold radiance. The mean luminance in the report (`NAME.report.json`) is in both
+units.
 
 `crt SCENE --expose auto` chooses `exposure_ev` so that the geometric mean of the luminance becomes
 18 % grey, and prints it.
@@ -283,13 +284,14 @@ std::string_view familyIntroduction(std::string_view family) {
     if (family == "light")
         return "A light without a surface: `lights` lists them, and `type` picks one of these. One key sets "
                "the brightness, and its name gives the unit: a spectrum in absolute terms, or an amount to "
-               "which `spectrum` is scaled. A scene unit is a metre.\n\n"
+               "which `spectrum` is scaled. A scene unit is a metre unless [unit](#top-level) names another "
+               "length.\n\n"
                "All but suns have no size and are found by light sampling alone. They need "
                "`integrator.nee`, and they shine through panes. Their light is missing where it comes by "
                "way of smooth glass, mirrors, smooth metals and coats, or is mirrored by a pane: "
                "crt warns of this, and no stated error includes it (`missing_light` in the report, "
-               "`crt/missingLight` in images). A small emitting sphere is found there. With "
-               "`integrator.mis: false` they shine as ever.\n";
+               "`crt/missingLight` in images). Paths find a small emitting sphere in these places. "
+               "`integrator.mis: false` does not change these lights.\n";
     if (family == "transform")
         return "A placement is a list of steps, each a map with one key, applied in order: `[{scale: 2}, "
                "{rotate: {axis: [0, 1, 0], angle_deg: 90}}, {translate: [0, 1, 0]}]`.\n";

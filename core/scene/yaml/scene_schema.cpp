@@ -158,14 +158,14 @@ SectionSchema camera() {
              .count_max = 3,
              .unit = "scene units",
              .fallback = yaml(d.target),
-             .doc = "The point in the middle of the picture."},
+             .doc = "The point in the middle of the image."},
             {.name = "up",
              .kind = Kind::Number,
              .shape = Shape::List,
              .count_min = 3,
              .count_max = 3,
              .fallback = yaml(d.up),
-             .doc = "Direction that is up in the picture; need not be perpendicular to the view."},
+             .doc = "Direction that is up in the image; need not be perpendicular to the view."},
             {.name = "fov",
              .kind = Kind::Number,
              .range = {0, 180, true, true},
@@ -359,7 +359,8 @@ SectionSchema integrator() {
                  .unit = "scattering events",
                  .fallback = yaml(d.max_depth),
                  .doc = "Longest path; 0 shows emitters only, 1 is direct light. To pass a "
-                        "pane or a hole does not count; to cross a body of glass is 2."},
+                        "pane or a hole does not count; to cross a body of glass is 2. crt warns where "
+                        "the camera looks through more glass than this allows."},
                 {.name = "roulette_depth",
                  .kind = Kind::Integer,
                  .range = {0, 1e9, false, false},
@@ -413,7 +414,7 @@ SectionSchema sampler() {
                  .range = {1, 9007199254740992.0, false, false},
                  .unit = "per pixel",
                  .fallback = yaml(d.samples),
-                 .doc = "Used unless --spp or --time is given."},
+                 .doc = "Used unless `--spp`, `--time`, `--samples` or `--target-error` is given."},
                 {.name = "replicates",
                  .kind = Kind::Integer,
                  .range = {1, 16, false, false},
@@ -630,10 +631,10 @@ void addDielectrics(std::vector<SectionSchema>& all) {
     all.push_back({"material/thin_dielectric",
                    "a thin_dielectric material",
                    "A window pane made of one sheet of faces: two parallel surfaces, between which light is "
-                   "reflected back and forth, each polarisation by itself. Transmitted light is not bent: "
-                   "lights of every kind shine through any number of panes (4096 at most), and a passage is "
-                   "not a scattering event. A normal map affects the mirrored light only. AOVs of first "
-                   "hits describe the surface that stops a ray: mostly the one behind the pane, and the "
+                   "reflected back and forth, each polarisation by itself. Transmitted light is not bent, "
+                   "and a passage is not a scattering event. Light of every kind passes up to 4096 panes "
+                   "and holes in a row. A normal map affects the mirrored light only. AOVs of first hits "
+                   "describe the surface that stops a ray: mostly the one behind the pane, and the "
                    "pane itself in the share that it mirrors. A film is on one of the two surfaces.",
                    {materialType("thin_dielectric"),
                     index("Refractive index of the pane relative to its surroundings."),
@@ -746,9 +747,9 @@ void addShapes(std::vector<SectionSchema>& all) {
     };
     all.push_back({"sphere",
                    "a sphere",
-                   "A sphere around the origin, as it is: no triangles. A transform may turn, move and "
-                   "scale it, but not stretch it; nor disks and cylinders. Of textures u goes once around "
-                   "the axis z, from x, and v from the lower pole to the upper.",
+                   "A sphere around the origin, without triangles. A transform may rotate, move and scale "
+                   "spheres, disks and cylinders, but not stretch them. u goes once around the z axis, from "
+                   "x; v goes from the lower pole up.",
                    {radius, end("from_z", "The part below is left out; by default nothing is.", false),
                     end("to_z", "The part above is left out.", false), inward}});
     all.push_back({"disk",
@@ -863,10 +864,10 @@ void addObjects(std::vector<SectionSchema>& all) {
                         .kind = Kind::Choice,
                         .choices = {"auto", "always", "never"},
                         .fallback = "auto",
-                        .doc = "True if all placements share one copy of the mesh, which saves memory and "
-                               "makes rays slower. `auto` shares it if the object would otherwise have more "
-                               "than 4 million triangles. Surfaces that emit, and "
-                               "places that flatten the mesh, never share."},
+                        .doc = "`always`: all placements share one copy of the mesh. This saves memory and "
+                               "makes rays slower. `auto`: they share it if the object would otherwise have "
+                               "more than 4 million triangles. `never`: each placement has its own copy. "
+                               "Surfaces that emit, and places that flatten the mesh, never share."},
                        {.name = "transforms",
                         .kind = Kind::Section,
                         .shape = Shape::Lists,
@@ -915,7 +916,7 @@ void addObjects(std::vector<SectionSchema>& all) {
                         .count_max = 3,
                         .unit = "object units",
                         .required = true,
-                        .doc = "Vertices [x, y, z]."},
+                        .doc = "Vertices [x, y, z]. crt accepts all finite coordinates."},
                        {.name = "faces",
                         .kind = Kind::Integer,
                         .shape = Shape::Lists,
@@ -929,8 +930,10 @@ void addObjects(std::vector<SectionSchema>& all) {
                         .shape = Shape::Lists,
                         .count_min = 3,
                         .count_max = 3,
-                        .doc = "One per vertex, for smooth shading. Surfaces that reflect lose no light "
-                               "where they lean away from the faces; glass may."},
+                        .doc = "One per vertex, for smooth shading. No surface loses light where the "
+                               "normals lean away from the faces. A triangle with a normal that is zero or "
+                               "not finite is flat; crt normalises all others and turns them to the front "
+                               "of their triangle."},
                        {.name = "uvs",
                         .kind = Kind::Number,
                         .shape = Shape::Lists,
@@ -1048,11 +1051,11 @@ void addOutside(std::vector<SectionSchema>& all) {
           {.name = "sky", .kind = Kind::Section, .section = "sky", .doc = "A CIE standard general sky."},
           {.name = "light_sampling",
            .kind = Kind::Boolean,
-           .fallback = yaml(Environment{}.light_sampling),
-           .doc = "Sample directions of the environment where surfaces scatter, too. Pays where most "
-                  "of them are blocked, as in a room with a window (0.7 of the time to equal error); "
-                  "under an open sky it takes two to three times as long. Of an image or a sky they are "
-                  "chosen by its brightness, and the default is `true`."}},
+           .doc = "Sample directions of the environment where surfaces scatter, too. This pays where "
+                  "most directions are blocked, as in a room with a window (0.7 of the time to equal "
+                  "error). Under an open sky it takes two to three times as long. crt chooses directions "
+                  "of an image or a sky by brightness. The default is `true` with `image` or `sky`, else "
+                  "`false`."}},
          {{KeyRule::Kind::ExactlyOne, {"radiance", "image", "sky"}},
           {KeyRule::Kind::AtMostOne, {"radiance", "scale"}},
           {KeyRule::Kind::AtMostOne, {"radiance", "rotation_deg"}},
@@ -1079,7 +1082,8 @@ void addOutside(std::vector<SectionSchema>& all) {
                      .shape = Shape::List,
                      .choices = aovNames(),
                      .fallback = "[]",
-                     .doc = "Additional channels, in EXR files only."}}});
+                     .doc = "Additional channels, in EXR files only. `color_error`, the standard errors of "
+                            "R, G and B, makes the film larger: by 44 % with two replicates."}}});
 }
 
 }  // namespace

@@ -27,9 +27,9 @@ void addCompositions(std::vector<SectionSchema>& all) {
                                     .doc = "Normals from an image."});
     all.push_back({"material/mix",
                    "a mix material",
-                   "Two materials, of which each has a share of the surface, too fine to be seen: as in "
-                   "pbrt-v4, each sample takes one of them by chance. They may be mixes themselves, up to 8 "
-                   "deep, but have no opacity: give it to the whole.",
+                   "Each of two materials has a share of the surface. As in pbrt-v4, each sample takes one "
+                   "of them at random. They may be mixes themselves, up to 8 deep, but have no opacity: "
+                   "give it to the whole.",
                    {typeKey("mix", "material"),
                     {.name = "materials",
                      .shape = Shape::List,
@@ -61,11 +61,10 @@ void addCompositions(std::vector<SectionSchema>& all) {
                  .section = "texture",
                  .fallback = "1",
                  .doc =
-                     "Share of the surface that is there, as of leaves cut out by an image; light "
-                     "passes the rest unchanged, shadow rays too. A hole in the surface of a `dielectric` "
-                     "or `rough_dielectric` is one in the body: light that comes in by a hole is in no "
-                     "glass, and goes out without meeting the surface from within; light in the glass "
-                     "meets no hole."});
+                     "Opacity of the surface, as of leaves cut out by an image. Light passes the rest "
+                     "unchanged; shadow rays do too. In a `dielectric` or `rough_dielectric`, light that "
+                     "enters through a hole is not in the glass, and leaves without meeting the surface "
+                     "from inside. Light in the glass meets no hole."});
     SectionSchema map{
         "normal_map",
         "a normal map",

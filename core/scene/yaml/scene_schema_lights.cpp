@@ -118,11 +118,11 @@ void addLights(std::vector<SectionSchema>& all) {
                                    "The direction in which the light travels along its axis; any "
                                    "length but 0."),
                          vectorKey("target", "Alternatively, a point on its axis.", "scene units"),
-                         degreesKey("cone_angle_deg", {0, 180, true, false}, d.cone_angle_deg,
+                         degreesKey("cone_angle_deg", {0.01, 180, false, false}, d.cone_angle_deg,
                                     "From the axis to where the light ends."),
                          degreesKey("penumbra_deg", {0, 180, false, false}, d.penumbra_deg,
                                     "The outer part of that angle, in which the light falls to 0. At most "
-                                    "`cone_angle_deg`, to which the default gives way.")},
+                                    "`cone_angle_deg`; the default is smaller where the cone is.")},
              intensityKeys(" on the axis")),
          {{KeyRule::Kind::ExactlyOne, {"direction", "target"}},
           {KeyRule::Kind::ExactlyOne, kIntensities},

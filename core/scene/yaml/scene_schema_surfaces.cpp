@@ -122,8 +122,10 @@ void addOpenPbr(std::vector<SectionSchema>& all) {
          refused("subsurface_weight", "crt has no subsurface scattering."),
          weight("coat_weight", "0",
                 "Share of the surface that a coat lies on: a clear or tinted dielectric, like lacquer. Its "
-                "reflection is white; the layers below get the rest, and has the index `specular_ior` "
-                "relative to the coat's (or the inverse, where that is above 1). A clear base has no coat.",
+                "reflection is white; the layers below get the rest. A dielectric base has the index "
+                "`specular_ior` relative to the coat's (or the inverse, where that is above 1). crt "
+                "evaluates a metal under the coat at the angle in air, not at the smaller angle inside the "
+                "coat. A clear base has no coat.",
                 true),
          color("coat_color", "1",
                "Transmittance of the coat at normal incidence, in and out. At grazing angles the path is "
@@ -156,7 +158,7 @@ void addOpenPbr(std::vector<SectionSchema>& all) {
           .doc = "Its spectrum, times that. An `rgb` of 1 is D65 of luminance 1; a darker or brighter "
                  "colour makes a darker or brighter light."},
          weight("geometry_opacity", "1",
-                "Share of the surface that is there; light passes the rest unchanged, shadow rays too.",
+                "Opacity of the surface; light passes the rest unchanged, shadow rays too.",
                 true),
          {.name = "geometry_thin_walled",
           .kind = Kind::Boolean,

@@ -28,7 +28,7 @@ std::vector<KeySchema> transformKeys() {
              .range = kTurns,
              .unit = "degrees",
              .fallback = "0",
-             .doc = "Then (u, v) is turned counter-clockwise about (0, 0), which turns the picture "
+             .doc = "Then (u, v) is turned counter-clockwise about (0, 0), which turns the image "
                     "clockwise."},
             {.name = "offset",
              .kind = Kind::Number,
@@ -81,7 +81,7 @@ void addTextures(std::vector<SectionSchema>& all) {
                   "then in CRT_MESH_PATH. Or a glTF file or GLB, with `image`. Colours of an EXR with "
                   "alpha, which are multiplied by it, are divided by it. The primaries of an EXR and of an "
                   "HDR are converted to those of sRGB. Ignored, with a warning where they would change the "
-                  "picture: EXPOSURE and COLORCORR of an HDR, gAMA, cHRM and cICP of a PNG, ICC profiles "
+                  "image: EXPOSURE and COLORCORR of an HDR, gAMA, cHRM and cICP of a PNG, ICC profiles "
                   "and the EXIF orientation of PNG and JPEG."},
           {.name = "image",
            .kind = Kind::Integer,
