@@ -168,7 +168,8 @@ Statement statementOf(const Film& film, const PathFacts& paths) {
     std::vector<double> own;
     for (std::uint32_t y = 0; y < height; ++y)
         for (std::uint32_t x = 0; x < width; ++x) own.push_back(variance(x, y));
-    s.pixel_errors = stats::pooledVariances(own, width, height, variance.degreesOfFreedom()).variances;
+    s.pixel_errors = stats::variancesWithoutZeros(
+        stats::pooledVariances(own, width, height, variance.degreesOfFreedom()).variances, width, height);
     for (double& v : s.pixel_errors) v = std::sqrt(v);
     return s;
 }

@@ -220,6 +220,24 @@ TEST_CASE("light in six pixels, all of it half as bright again, raises an alarm"
     }
 }
 
+TEST_CASE("light in one pixel of a part in which neither image has noise raises an alarm",
+          "[false-alarms]") {
+    // Of images with fewer replicates no single pixel is judged.
+    synthetic::Maker maker(16);
+    int found = 0, clean = 0;
+    for (int i = 0; i < 10; ++i) {
+        const Scenario s{Noise::Normal, true, 16, 0.02, 32, 32};
+        std::array<Image, 2> images{maker.image(s), maker.image(s)};
+        for (Image& image : images)  // Half of it is black.
+            std::fill(image.pixels.begin(), image.pixels.begin() + 4 * 32 * 16, 0.0f);
+        clean += alarmed(compareNoise(images[0], images[1]));
+        for (std::size_t c = 0; c < 3; ++c) images[0].pixels[4 * (32 * 8 + 16) + c] = 0.5f;
+        found += alarmed(compareNoise(images[0], images[1]));
+    }
+    CHECK(found == 10);
+    CHECK(clean <= 1);
+}
+
 TEST_CASE(
     "what is only noise raises no more alarms than is stated when one image has sixteen times the samples",
     "[false-alarms]") {

@@ -100,6 +100,7 @@ struct LeakCheck {
 }  // namespace
 
 // Definitions that cuda.h leaves open: an event is the time of its recording, a function its name.
+struct CUstream_st {};
 struct CUevent_st {
     double seconds = 0;
 };
@@ -318,6 +319,17 @@ CRT_FAKE cuMemsetD8(CUdeviceptr to, unsigned char value, std::size_t bytes) {
     return CUDA_SUCCESS;
 }
 
+/// Launches run when they are made, so that all streams are in order.
+CRT_FAKE cuStreamCreate(CUstream* stream, unsigned flags) {
+    CRT_FAKE_NEEDS_DEVICE();
+    if (flags != CU_STREAM_DEFAULT) return CUDA_ERROR_INVALID_VALUE;  // It would not wait for the default one.
+    *stream = new CUstream_st;
+    return CUDA_SUCCESS;
+}
+CRT_FAKE cuStreamDestroy(CUstream stream) {
+    delete stream;
+    return CUDA_SUCCESS;
+}
 CRT_FAKE cuEventCreate(CUevent* event, unsigned) {
     *event = new CUevent_st;
     return CUDA_SUCCESS;
