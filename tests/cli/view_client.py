@@ -16,7 +16,11 @@ TOKEN = "0123456789abcdefghij"
 class View:
     """Of the scene.yaml of a test, at a free port unless one is given."""
 
+    # The program reads files again that changed so shortly before it read them (file_times.cpp).
+    SETTLING_SECONDS = 0.03
+
     def __init__(self, test, *arguments, port=0, **start):
+        time.sleep(self.SETTLING_SECONDS)
         self.process = test.start("view", "scene.yaml", "--no-open", "--port", str(port), "--token", TOKEN,
                                   *arguments, **start)
         self.address = self.process.stdout.readline().strip()
