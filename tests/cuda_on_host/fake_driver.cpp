@@ -322,7 +322,7 @@ CRT_FAKE cuMemsetD8(CUdeviceptr to, unsigned char value, std::size_t bytes) {
 /// Launches run when they are made, so that all streams are in order.
 CRT_FAKE cuStreamCreate(CUstream* stream, unsigned flags) {
     CRT_FAKE_NEEDS_DEVICE();
-    if (flags != CU_STREAM_DEFAULT) return CUDA_ERROR_INVALID_VALUE;  // It would not wait for the default one.
+    if (flags != CU_STREAM_DEFAULT) return CUDA_ERROR_INVALID_VALUE;  // It must wait for the default one.
     *stream = new CUstream_st;
     return CUDA_SUCCESS;
 }

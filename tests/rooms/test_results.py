@@ -25,6 +25,9 @@ class Pages(unittest.TestCase):
     def test_they_are_few(self):
         self.assertLessEqual(len(self.pages), 8)
 
+    def test_the_first_page_is_short(self):
+        self.assertLessEqual(len((ROOT / "README.md").read_text("utf-8").splitlines()), 160)
+
     def test_marks_come_in_pairs_and_names_once(self):
         names = []
         for page, text in self.pages.items():
