@@ -1,4 +1,4 @@
-# What a backend builds against, in this tree and installed under the same names:
+# The targets that a backend links, with the same names in this tree and in an installed one:
 #   crt::backend_headers  backend/crt_backend.h, backend/sdk/*.h, the layout hash, kernel/*/*.h
 #   crt::kernel_cache     backend/sdk/kernel_cache.h and its code, to be linked into the plugin
 

@@ -5,7 +5,7 @@
 #
 # Makes the target crt_backend_<name>, a module crt_backend_<name>.so that
 #   - exports crt_backend_v1 and nothing else,
-#   - links nothing of crt but the headers (an undefined symbol is an error now, not when somebody loads it),
+#   - links nothing of crt but the headers (an undefined symbol is an error now, not when crt loads it),
 #   - is compiled without contraction, so that it rounds as every other backend does,
 #   - finds libraries shipped beside it or one folder up, wherever the tree is moved to.
 # It is built into OUTPUT_DIRECTORY (default: ${CRT_BACKEND_OUTPUT_DIRECTORY} where set) and installed to

@@ -13,7 +13,7 @@ set(CPACK_STRIP_FILES ON)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PACKAGE_SECTION graphics)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
-# What makes the pages of crt converge and crt verify.
+# Python and its packages make the pages of crt converge and crt verify.
 set(CPACK_DEBIAN_PACKAGE_RECOMMENDS "python3, python3-jinja2, python3-matplotlib")
 set(CPACK_DEBIAN_PACKAGE_SUGGESTS "pocl-opencl-icd, libcuda1, bash-completion")
 set(CPACK_DEBIAN_COMPRESSION_TYPE

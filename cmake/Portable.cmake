@@ -55,8 +55,8 @@ if(CMAKE_SCRIPT_MODE_FILE)
     file(COPY ${library} DESTINATION ${tree}/lib FOLLOW_SYMLINK_CHAIN)
   endforeach()
 
-  # The suite goes into a tree of its own and out of the program's, where `cmake --install` puts it. `crt
-  # verify` works where both are unpacked in the same place.
+  # `cmake --install` puts the suite into the program's tree. Here it moves to a separate tree. `crt verify`
+  # works where both are unpacked in the same place.
   set(tests ${staging}/crt-portable-tests/crt)
   file(COPY ${REFERENCE_BACKEND} DESTINATION ${tests}/lib/crt)
   file(MAKE_DIRECTORY ${tests}/bin)
@@ -79,7 +79,7 @@ add_custom_target(portable
           -P ${CMAKE_CURRENT_LIST_FILE}
   COMMENT "Packing crt-portable.tar.gz"
   VERBATIM)
-# What is installed, and what is taken from the build tree.
+# The targets whose files are installed or copied from the build tree.
 foreach(part crt crt_backend_cuda crt_backend_embree crt_backend_opencl crt_image_oiio crt_kernel_cache
   crt_meshes crt_shell_files crt-meshgen
         conformance crt_backend_example libcrt paper_host paper_gpu)

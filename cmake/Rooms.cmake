@@ -7,7 +7,7 @@
 # interface library where it has headers alone, which are then compiled once for themselves. HEADERS are
 # further ones that it shows, named as from there.
 # COLD: files in which nothing takes time; they are compiled for size. Its headers are included as
-# "<folder>/<name>.h". Each room has an include root of its own, build/rooms/<target>, which holds links to
+# "<folder>/<name>.h". Each room has its own include root, build/rooms/<target>, which holds links to
 # its headers and to nothing else: a file sees the headers of the rooms that its own room USES, and of those
 # that these use. So an include against the arrows does not compile. tests/rooms/check_rooms.py draws the
 # arrows, and fails when there is a cycle.
@@ -34,8 +34,8 @@ function(_crt_link_headers target folder)
   endforeach()
 endfunction()
 
-# The cold files of a room, for size: a target of their own, so that they too can be compiled several at a
-# time.
+# The cold files of a room, compiled for size. They are a separate target, so that several of them can be
+# compiled at a time, too.
 function(_crt_cold_part target folder)
   list(TRANSFORM ARGN PREPEND ${CMAKE_CURRENT_SOURCE_DIR}/${folder}/)
   add_library(${target}_cold OBJECT ${ARGN})

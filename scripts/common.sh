@@ -12,7 +12,7 @@ JOBS=${CRT_JOBS:-$(nproc)}
 say() { printf '== %s\n' "$*"; }
 fail() { printf '== error: %s\n' "$*" >&2; exit 1; }
 
-# Whether $1 is a CUDA toolkit new enough for us. Debian 12's own nvcc, 11.8, is not.
+# True if $1 is a CUDA toolkit that is new enough for crt. Debian 12's nvcc, 11.8, is too old.
 cuda_is_usable() {
     [ -x "$1/bin/nvcc" ] || return 1
     local major
@@ -38,7 +38,7 @@ find_cuda() {
     cuda_is_usable "$CUDA_CACHE/toolkit" && readlink -f "$CUDA_CACHE/toolkit"
 }
 
-# Whether scripts/setup has made an environment of Python that has what the package needs and its tests.
+# True if scripts/setup has made an environment of Python with all modules of the package and its tests.
 python_is_usable() {
     local modules='nanobind, numpy, pytest, tqdm, yaml, jinja2, nbclient, ipykernel, matplotlib, distributed'
     "$PYTHON_CACHE/bin/python3" -c "import $modules" 2>/dev/null

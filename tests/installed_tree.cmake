@@ -1,6 +1,5 @@
-# What leaves the build tree runs without it: crt as `cmake --install` puts it, moved, and crt as the target
-# `portable` packs it, unpacked. Both render with an empty environment from a folder that has nothing to do
-# with them.
+# crt runs without its build tree: a tree that `cmake --install` has made and that was moved, and a package
+# of the target `portable` that was unpacked. Both render with an empty environment from an unrelated folder.
 #
 #   cmake -DMODE=install|portable -DBUILD_DIR=… -DWORK_DIR=… [-DSTRIP=… -DREFERENCE_BACKEND=…
 #   -DPORTABLE_SCRIPT=…] -P installed_tree.cmake
@@ -25,7 +24,7 @@ function(render tree scene)
 endfunction()
 
 # An empty environment; in a sanitizer's build without the search for leaks, for which the suppressions would
-# be missing. Nobody else reads the variable.
+# be missing. Other builds do not read the variable.
 set(CLEAN env -i ASAN_OPTIONS=detect_leaks=0)
 
 file(REMOVE_RECURSE ${WORK_DIR})
@@ -48,7 +47,7 @@ else()
       message(FATAL_ERROR "${archive}.tar.gz has ${bytes} bytes: more than ${limit}")
     endif()
   endforeach()
-  # What crt adds to Embree's 42 MiB stays small unpacked, too; meshes, which are text, do not.
+  # The unpacked package is small, too, apart from Embree's 42 MiB and the meshes, which are text.
   set(bytes 0)
   file(GLOB_RECURSE files ${WORK_DIR}/crt/*)
   list(FILTER files EXCLUDE REGEX "/share/crt/meshes/|/libembree")

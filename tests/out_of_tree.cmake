@@ -1,6 +1,6 @@
-# The road of somebody who writes a backend: install crt, move the tree to where he wants it, build
-# docs/example_backend against it, and see that it is usable and passes the conformance suite. Nothing of the
-# source or build tree of crt is used after the install but that suite.
+# The steps of a backend's author: install crt, move the tree, and build docs/example_backend against it. crt
+# must load the backend, and the backend must pass the conformance suite. After the install the test uses
+# nothing of the source or build tree of crt but that suite.
 #
 #   cmake -DSOURCE_DIR=… -DBUILD_DIR=… -DWORK_DIR=… -DGENERATOR=… -DCXX_COMPILER=…
 #     [-DCXX_FLAGS=…] -P out_of_tree.cmake

@@ -1,7 +1,7 @@
-# The road of somebody whose program renders with libcrt: install crt, move the tree to where he wants it,
-# build docs/example_program against it by find_package and by pkg-config, run it from elsewhere with an
-# empty environment, and look at the image. Nothing of the source or build tree of crt is used after the
-# install.
+# The steps of the author of a program that renders with libcrt: install crt, move the tree, build
+# docs/example_program against it by find_package and by pkg-config, run it from another folder with an empty
+# environment, and check the image. After the install the test uses nothing of the source or build tree of
+# crt.
 #
 #   cmake -DSOURCE_DIR=… -DBUILD_DIR=… -DWORK_DIR=… -DGENERATOR=… -DCXX_COMPILER=…
 #     [-DCXX_FLAGS=…]
@@ -32,8 +32,8 @@ install_and_move()
 build_example(example_program)
 expect_image(${WORK_DIR}/build/example_program package.png)
 
-# Installed by an account of its own, and used by a program of another: libcrt's owner may also have written
-# its plugins.
+# A separate account has installed crt, and another account runs the program. libcrt also trusts plugins
+# that its owner has written.
 execute_process(COMMAND id -u OUTPUT_VARIABLE user OUTPUT_STRIP_TRAILING_WHITESPACE)
 if(user STREQUAL "0")
   run(chown -R 65534:65534 ${WORK_DIR}/moved)

@@ -1,4 +1,4 @@
-# What the tests of trees that have left the build tree share. They work in WORK_DIR.
+# Functions of the tests of installed, packed and moved trees. They work in WORK_DIR.
 include(${CMAKE_CURRENT_LIST_DIR}/../cmake/Run.cmake)
 
 # Installs crt and moves it to ${WORK_DIR}/moved.

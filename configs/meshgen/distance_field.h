@@ -34,7 +34,7 @@ public:
         add(blend, [=](Vec p) { return ellipsoid(p, centre, radii); });
     }
 
-    /// Which parts matter within `radius` of `centre`: most of a figure is far from any one place.
+    /// The parts that matter within `radius` of `centre`: most of a figure is far from any one place.
     std::vector<std::uint32_t> partsNear(Vec centre, double radius) const {
         std::vector<double> distance(parts_.size());
         double nearest = 1e30;

@@ -11,7 +11,7 @@ namespace crt::meshgen {
 Mesh sphere(std::uint32_t segments, std::uint32_t rings);
 
 /// A dispersing prism: equilateral section of height 1 in the xy plane, apex up, two units long in z. Its
-/// faces are flat, so it has no normals of its own.
+/// faces are flat, so the mesh stores no normals.
 Mesh prism();
 
 /// An ape sitting on a block of stone and thinking, chin on hand, after the bronze that Hugo Rheinhold made

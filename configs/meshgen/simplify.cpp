@@ -135,7 +135,7 @@ private:
         return longest2 > 0.0 ? length(areaVector(corner)) / longest2 : 0.0;
     }
 
-    /// Whether the faces of `v`, but for those with `other`, keep their side and a reasonable shape when v
+    /// True if the faces of `v`, but for those with `other`, keep their side and a reasonable shape when v
     /// moves.
     bool facesSurvive(std::uint32_t v, std::uint32_t other, Vec to) const {
         for (const std::uint32_t f : faces_of_[v]) {

@@ -32,7 +32,7 @@ private:
     std::vector<double> values_ = std::vector<double>(std::size_t{64} * 64);
 };
 
-/// How far a point is beside the trail.
+/// Signed distance along x of a point from the trail.
 double besideTrail(double x, double z) {
     const double from_start = z + 0.5;
     return x - 0.022 * onCircle(1000 * from_start).z - 0.03 * from_start * from_start;

@@ -82,8 +82,8 @@ hide: [navigation, toc]
 # Gallery
 
 Every scene that comes with crt, rendered small when this site was made, by the command below each
-({where}): at most {SECONDS} seconds of sampling, so that what is rare, a caustic, is still noisy. *error* is
-what the image knows of its own error, relative to its mean luminance ([what that means](error.md)).
+({where}): at most {SECONDS} seconds of sampling, so that rare paths, as of a caustic, are still noisy.
+*error* is the estimate of the image's error, relative to its mean luminance ([what that means](error.md)).
 
 <div class="gallery" markdown>
 

@@ -50,7 +50,8 @@ def package(build, work):
 
 def decision_index(decisions):
     """The page that lists them, with the status that each must have."""
-    lines = ["# Decisions", "", "Why crt is built as it is.", "", "| | decision | status |", "|---|---|---|"]
+    lines = ["# Decisions", "", "The reasons for the design of crt.", "", "| | decision | status |",
+             "|---|---|---|"]
     for file in decisions:
         text = file.read_text("utf-8")
         status = STATUS.search(text)

@@ -60,7 +60,7 @@ class Stage:
         name, hash_sign, fragment = target.partition("#")
         place = pathlib.Path(source.parent, name).resolve()
         if place not in self.tree.files and place not in self.tree.folders:
-            raise SystemExit(f"{source.relative_to(ROOT)}: {target} leads nowhere")
+            raise SystemExit(f"{source.relative_to(ROOT)}: {target}: no such file or folder")
         return os.path.relpath(self.page_of(place), os.path.dirname(page) or ".") + hash_sign + fragment
 
     def rewritten(self, text, source, page, own):
@@ -114,7 +114,7 @@ class Stage:
 
     def show_folder(self, folder):
         page = self.page_of(folder)
-        lines = [HIDDEN, f"# {folder.relative_to(ROOT)}/\n", "What lies in this folder of the repository.\n"]
+        lines = [HIDDEN, f"# {folder.relative_to(ROOT)}/\n", "The files of this folder of the repository.\n"]
         inner = {place for place in self.tree.files | self.tree.folders if place.parent == folder}
         for place in sorted(inner, key=lambda place: (place.is_file(), place.name)):
             name = f"`{place.name}{'/' if place.is_dir() else ''}`"

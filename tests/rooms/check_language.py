@@ -14,13 +14,15 @@ import sys
 
 sys.dont_write_bytecode = True
 from check_links import known_files  # noqa: E402
-from texts import texts  # noqa: E402
+from texts import reader_of  # noqa: E402
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-FOLDERS = ("bench", "core", "docs", "plugins", "python", "scripts", "tests", "verify")
-PAGES = ("README.md", "CONTRIBUTING.md")
+FOLDERS = (".ci", ".github", "bench", "cmake", "configs", "core", "data", "docs", "plugins", "python",
+           "scripts", "tests", "verify")
+PAGES = ("README.md", "CONTRIBUTING.md", "CMakeLists.txt", "Dockerfile", "pyproject.toml", ".clang-format",
+         ".clang-tidy")
 # Texts that a user sees: strings of these folders, except of tests.
-SEEN = ("core", "plugins", "python/crt", "python/src", "verify")
+SEEN = ("CMakeLists.txt", "cmake", "core", "plugins", "python/crt", "python/src", "scripts", "verify")
 # The rules quote what they forbid.
 QUOTES = {"CONTRIBUTING.md", "tests/rooms/check_language.py", "tests/rooms/test_language.py"}
 
@@ -84,10 +86,15 @@ def has_main_clause(kind, sentence):
     return kind == "page" and len(VERB.findall(sentence)) > 1
 
 
+def is_in(name, places):
+    """True if a file is one of these or in a folder of these."""
+    return name in places or name.startswith(tuple(place + "/" for place in places))
+
+
 def area(name, kind):
     if kind == "comment":
         return "comments"
-    if kind == "message" and not (name.startswith(tuple(f + "/" for f in SEEN)) and "/tests/" not in name):
+    if kind == "message" and (not is_in(name, SEEN) or "/tests/" in name):
         return None
     return "messages and pages"
 
@@ -98,13 +105,14 @@ def check(root, folders):
     number = 0
     for file in sorted(known_files(root)):
         name = file.relative_to(root).as_posix()
-        if name in QUOTES or not (name in folders or name.startswith(tuple(f + "/" for f in folders))):
+        if name in QUOTES or not is_in(name, folders):
             continue
-        if file.suffix not in (".md", ".cpp", ".h", ".cu", ".c", ".cl", ".js", ".py"):
+        reader = reader_of(file)
+        if reader is None:
             continue
         source = file.read_text("utf-8")
         number += 1
-        for text in texts(file, source):
+        for text in reader(source):
             where = area(name, text.kind)
             if where is None or text.heading and name.startswith("docs/decisions/"):
                 continue  # titles of decisions are names

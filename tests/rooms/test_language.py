@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""check_language.py finds each pattern in messages, pages and comments, also over line breaks, and accepts
-plain sentences."""
+"""check_language.py finds each pattern in messages, pages and comments of each kind of file, also over line
+breaks, and accepts plain sentences."""
 
 import pathlib
 import subprocess
@@ -28,10 +28,51 @@ PLAIN = ("Returns the error of the image.", "True if the kernel is lean.", "How 
          "Where a lens is given, the camera focuses.", "The file that has a record of its own scene.",
          "Users who build crt need CMake.", "There are so many that it matters.", "How to add a material.",
          "It differs from the other one; is another than the first excluded?", "`What is this` is code.")
+# A cell of text, and a comment of a cell of code.
+TEXT_CELL = '{"cells": [{"cell_type": "markdown", "source": [\n"# A title\\n",\n"{}"]}]}'
+CODE_CELL = '{"cells": [{"cell_type": "code", "source": [\n"a = 1\\n",\n"# {}"]}]}'
+# Name of a file, with {} for the number of the case -> texts of such a file, with {} for the sentence.
 WRAPS = {
-    "core/a.cpp": ("// {}", 'const char* a = "{}";', "/* {} */", "int b = 1'000;  ///< {}"),
-    "python/crt/a.py": ("# {}", 'a = "{}"', 'def b():\n    """{}"""'),
-    "docs/a.md": ("{}", "- {}", "> {}"),
+    "core/a{}.cpp": ("// {}", 'const char* a = "{}";', "/* {} */", "int b = 1'000;  ///< {}"),
+    "python/crt/a{}.py": ("# {}", 'a = "{}"', 'def b():\n    """{}"""'),
+    "docs/a{}.md": ("{}", "- {}", "> {}"),
+    "docs/a{}.md.in": ("{}",),
+    "docs/a{}.ipynb": (TEXT_CELL, CODE_CELL),
+    "core/a{}/CMakeLists.txt": ("# {}", 'message(STATUS "#1")  # {}', 'message("{}")'),
+    "core/a{}.cmake": ("# {}", "set(A [[ \" ]])\n# {}"),
+    "core/a{}.cmake.in": ("# {}",),
+    "core/a{}.sh": ("# {}", "a='it # is'  # {}", 'echo "{}"', "b=${#a}\n    # {}"),
+    "core/script{}": ("#!/usr/bin/env bash\n# {}", "#!/usr/bin/env bash\necho $1  # {}",
+                      "#!/usr/bin/env python3\na = '''{}'''", "#!/usr/bin/env python3\n# {}"),
+    "core/a{}.yaml": ("# {}", "a: crt's  # {}", 'title: "{}"', "title: {}  # a comment"),
+    "core/a{}/Dockerfile": ("# {}",),
+    "core/a{}.toml": ("# {}",),
+    "core/a{}.html": ("<p>{}</p>", "<b>A title</b></p><p>{}", "{# {} #}", "<!-- {} -->", '<a alt="{}">',
+                      "{{ a(\"{}\") }}", "{% if a %}\n{}\n{% endif %}"),
+    "core/a{}.mutant": ("Breaks: {}", "List: {}"),
+}
+# Sentences that begin in one line and end in another.
+BROKEN = {
+    "core/broken.cpp": ('/// A loop of\n/// its own.\n'
+                        'const char* b = "a loop of "\n    "its own";\n', (1, 3)),
+    "core/broken.sh": ('# A loop of\n# its own.\necho "a loop of" \\\n    "its own"\n', (1, 3)),
+    "core/CMakeLists.txt": ('set(A ON)\n# A loop of\n# its own.\nmessage("a loop of "\n  "its own")\n',
+                            (2, 4)),
+    "core/broken.yaml": ("a: 1\n# A loop of\n# its own.\n", (2,)),
+    "core/broken.html": ("<p>A\n<b>loop</b> of\n    its <i>own</i>.</p>\n<p>A loop of\nits own.\n", (2, 4)),
+    "core/broken.mutant": ("Mutation: a\nBreaks: It has a loop\n  of\n  its own.\n", (3,)),
+    "docs/broken.ipynb": (TEXT_CELL.replace("{}", 'A loop of\\n",\n"its own.'), (3,)),
+}
+CODE = {
+    "docs/code.md": "```\nNobody may differ.\n```\n\n    Nobody may differ.\n\n`Nobody`\n",
+    "docs/code.ipynb": TEXT_CELL.replace("{}", "```\\n\",\n\"Nobody may differ.\\n\",\n\"```"),
+    "core/code.html": ("<!DOCTYPE nobody><style>Nobody {}</style><script>nobody()</script>\n"
+                       "<pre>Nobody</pre><h2>What is listed</h2>\n"
+                       '<p class="Nobody may">{% if nobody %}{{ nobody }}{% endif %}</p>\n'),
+    "core/code.yaml": "a: Nobody\nb: 'it # Nobody may differ.'\nc: [\"# Nobody\"]\n",
+    "core/code.sh": "echo $# 'it # Nobody may' nobody#Nobody\n",
+    "core/code.mutant": "Mutation: nobody\nKilled-by: unit Nobody\n\nIn: a b\n- nobody\n+ b /* No one */\n",
+    "core/code": "Nobody is no script.\n",
 }
 
 
@@ -50,22 +91,19 @@ def main():
     cases = [(name, text) for name, planted in PLANTED.items() for text in planted]
     files, expected = {}, []
     for place, wraps in WRAPS.items():
-        folder, _, ending = place.rpartition(".")
         for number, wrap in enumerate(wraps):
+            above = "" if wrap.startswith("#!") else "\n\n"
+            line = 1 + (above + wrap)[:(above + wrap).index("{}")].count("\n")
             for case, (name, text) in enumerate(cases):
-                file = f"{folder}_{number}_{case}.{ending}"
-                files[file] = "\n\n" + wrap.format(text) + "\n"
-                line = 4 if "\n" in wrap else 3
+                file = place.replace("{}", f"_{number}_{case}")
+                files[file] = above + wrap.replace("{}", text) + "\n"
                 expected.append(f"{file}:{line}: {name}: ")
-    files["core/broken.cpp"] = ('/// A loop of\n/// its own.\n'
-                                'const char* b = "a loop of "\n    "its own";\n')
-    expected += ["core/broken.cpp:1: own: ", "core/broken.cpp:3: own: "]
-    files["docs/code.md"] = "```\nNobody may differ.\n```\n\n    Nobody may differ.\n\n`Nobody`\n"
-    for place, wraps in WRAPS.items():
-        folder, _, ending = place.rpartition(".")
-        for number, wrap in enumerate(wraps):
             for case, text in enumerate(PLAIN):
-                files[f"{folder}_plain_{number}_{case}.{ending}"] = wrap.format(text) + "\n"
+                files[place.replace("{}", f"_plain_{number}_{case}")] = wrap.replace("{}", text) + "\n"
+    for file, (text, lines) in BROKEN.items():
+        files[file] = text
+        expected += [f"{file}:{line}: own: " for line in lines]
+    files.update(CODE)
     done = check(files)
     found = done.stdout.splitlines()
     for want in expected:
@@ -73,7 +111,7 @@ def main():
             failed += 1
             print(f"not found: {want}")
     for line in found:
-        if "plain" in line or "code.md" in line:
+        if "plain" in line or line.split(":")[0] in CODE:
             failed += 1
             print(f"plain, and called wrong: {line}")
     if done.returncode not in (0, 1) or done.stderr:

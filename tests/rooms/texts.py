@@ -1,10 +1,13 @@
 """The sentences of a source: its comments, the texts that a user sees, and the prose of its pages. Each is
-one string with the line of every character, so that a sentence that is broken over lines is found."""
+one string with the line of every character, so that a sentence that is broken over lines is found. READERS
+lists the kinds of files."""
 
 import ast
 import bisect
 import dataclasses
+import functools
 import io
+import json
 import re
 import tokenize
 
@@ -18,6 +21,32 @@ CPP = re.compile(r"""
 LEAD = re.compile(r"[ \t]*(?:///?<?|/?\*+(?!/)<?!?|\#+:?)?[ \t]*")
 LITERAL = re.compile(r"""[rbfRBF]{0,2}("{3}|'{3}|"|')(.*?)(?<!\\)\1""", re.DOTALL)
 FENCE = re.compile(r"^ {0,3}(`{3,}|~{3,})")
+# Comments that begin with #, and the strings, in which # begins no comment.
+CMAKE = re.compile(r"""
+    \#?\[(?P<equals>=*)\[.*?\](?P=equals)\] | (?P<comment>\#[^\n]*) | "(?P<text>(?:\\.|[^"\\])*)"
+""", re.VERBOSE | re.DOTALL)
+SHELL = re.compile(r"""
+    (?<![^\s;()])(?P<comment>\#(?!!)[^\n]*) | \\. | "(?P<text>(?:\\.|[^"\\])*)" | '[^']*'
+""", re.VERBOSE | re.DOTALL)
+YAML = re.compile(r"""
+    (?<!\S)(?P<comment>\#[^\n]*)
+  | (?<![^\s,:{[(])(?:"(?:\\.|[^"\\])*" | '(?:\'\'|[^'])*')
+""", re.VERBOSE | re.DOTALL)
+TITLE = re.compile(r"""^ *title: +(["']?)(?P<title>.*?)\1(?: +#.*)?$""", re.MULTILINE)
+# Pages and Jinja's templates of pages.
+HTML = re.compile(r"""
+    <!--(?P<comment>.*?)--> | <![A-Za-z][^>]*> | \{\#(?P<remark>.*?)\#\}
+  | <(?P<raw>script|style|pre)\b.*?</(?P=raw)>
+  | \{\{(?P<value>.*?)\}\} | \{%(?P<statement>.*?)%\}
+  | <(?P<end>/?)(?P<tag>\w+)(?P<attributes>(?:"[^"]*"|'[^']*'|[^>"'])*)>
+""", re.VERBOSE | re.DOTALL)
+INLINE = {"a", "b", "code", "em", "i", "small", "span", "strong", "sub", "sup"}
+HEADINGS = {"h1", "h2", "h3", "h4", "summary", "td", "th", "title"}
+LABEL = re.compile(r"""\b(?:alt|aria-label|placeholder|title)="(?P<text>[^"]+)\"""")
+STRING = re.compile(r""""[^"]*"|'[^']*'""")
+BETWEEN = re.compile(r"-?\s*(?:(?:end)?(?:block|for|macro)|extends)\b")
+# Sentences of a mutant; what it changes is code.
+MUTANT = re.compile(r"^(?:List|Breaks): (.*(?:\n +\S.*)*)$", re.MULTILINE)
 
 
 @dataclasses.dataclass
@@ -105,7 +134,7 @@ def python_texts(source):
 
     comments, last = [], None
     for token in tokenize.generate_tokens(io.StringIO(source).readline):
-        if token.type != tokenize.COMMENT:
+        if token.type != tokenize.COMMENT or token.start == (1, 0) and token.string.startswith("#!"):
             continue
         here = starts[token.start[0] - 1] + token.start[1]
         if last != (token.start[0] - 1, token.start[1]) and comments:
@@ -173,11 +202,128 @@ def page_texts(source):
         place += len(line)
 
 
-def texts(path, source):
-    if path.suffix == ".md":
-        return list(page_texts(source))
-    if path.suffix in (".cpp", ".h", ".cu", ".c", ".cl", ".js"):
-        return list(cpp_texts(source))
-    if path.suffix == ".py":
-        return list(python_texts(source))
-    return []
+def hash_texts(language, source):
+    """Comments that begin with #, and strings, of a language (CMAKE, SHELL or YAML)."""
+    comment, comment_end, margin = [], 0, None
+    strings, string_end = [], 0
+    for token in language.finditer(source):
+        start = token.start()
+        if token.lastgroup == "comment":
+            follows = source[comment_end:start].strip(" \t") == "\n" and column(source, start) == margin
+            if comment and not follows:
+                yield joined("comment", comment, "\n")
+                comment = []
+            comment += comment_lines(source, *token.span())
+            comment_end, margin = token.end(), column(source, start)
+        elif token.lastgroup == "text":
+            if strings and source[string_end:start].strip(" \\\n"):
+                yield joined("message", strings, " ")
+                strings = []
+            strings += comment_lines(source, *token.span("text"))
+            string_end = token.end()
+    if comment:
+        yield joined("comment", comment, "\n")
+    if strings:
+        yield joined("message", strings, " ")
+
+
+def yaml_texts(source):
+    yield from hash_texts(YAML, source)
+    for found in TITLE.finditer(source):
+        yield joined("page", [(found.start("title"), found["title"])])
+
+
+def words_of(source, start, end):
+    """(place, text) of each word, and of one blank for the white space between two."""
+    for found in re.finditer(r"\S+|\s+", source[start:end]):
+        yield start + found.start(), found[0] if found[0].strip() else " "
+
+
+def divides(found):
+    """True if a tag or a statement of the template ends a paragraph."""
+    if found["tag"]:
+        return found["tag"] not in INLINE
+    if found["statement"]:
+        return BETWEEN.match(found["statement"]) is not None
+    return not found["value"]
+
+
+def html_paragraphs(source):
+    """`code` and values of the template are one word."""
+    pieces, heading, end = [], False, 0
+    for found in [*HTML.finditer(source), None]:
+        pieces += words_of(source, end, found.start() if found else len(source))
+        if found is None or divides(found):
+            pieces = [piece for before, piece in zip([(0, " "), *pieces], pieces)
+                      if (before[1], piece[1]) != (" ", " ")]
+            if pieces:
+                text = joined("page", pieces)
+                text.heading = heading
+                yield text
+            pieces, heading = [], found is not None and found["tag"] in HEADINGS and not found["end"]
+        elif found["value"]:
+            pieces.append((found.start(), "`x`"))
+        elif found["tag"] == "code":
+            pieces.append((found.start(), "`"))
+        end = found.end() if found else end
+
+
+def html_texts(source):
+    """Paragraphs, headings and labels of a page, and comments and strings of its template."""
+    yield from html_paragraphs(source)
+    for found in HTML.finditer(source):
+        for kind in ("comment", "remark"):
+            if found[kind]:
+                yield joined("comment", list(words_of(source, *found.span(kind))))
+        for kind in ("value", "statement"):
+            for string in STRING.finditer(found[kind] or ""):
+                yield joined("message", [(found.start(kind) + string.start() + 1, string[0][1:-1])])
+        if found["tag"]:
+            for label in LABEL.finditer(source, *found.span("attributes")):
+                yield joined("page", list(words_of(source, *label.span("text"))))
+
+
+def notebook_texts(source):
+    """Cells of text, and the comments of cells of code."""
+    at = 0
+    for cell in json.loads(source)["cells"]:
+        lines, starts, places = cell["source"], [0], []
+        for line in [lines] if isinstance(lines, str) else lines:
+            at = max(at, source.find(json.dumps(line, ensure_ascii=False), at + 1))
+            places.append(at + 1)
+            starts.append(starts[-1] + len(line))
+        code = "".join(lines)
+        for text in page_texts(code) if cell["cell_type"] == "markdown" else hash_texts(SHELL, code):
+            text.places = [(here, places[min(bisect.bisect_right(starts, there), len(places)) - 1])
+                           for here, there in text.places]
+            yield text
+
+
+def mutant_texts(source):
+    for found in MUTANT.finditer(source):
+        yield joined("comment", list(words_of(source, *found.span(1))))
+
+
+cmake_texts = functools.partial(hash_texts, CMAKE)
+shell_texts = functools.partial(hash_texts, SHELL)
+# Ending or name of a file -> the function that yields its texts. Scripts without an ending: reader_of.
+READERS = {
+    **dict.fromkeys((".cpp", ".h", ".cu", ".c", ".cl", ".js"), cpp_texts),
+    ".py": python_texts, ".md": page_texts, ".html": html_texts, ".ipynb": notebook_texts,
+    ".cmake": cmake_texts, "CMakeLists.txt": cmake_texts, ".mutant": mutant_texts,
+    **dict.fromkeys((".sh", ".supp", ".toml", "Dockerfile"), shell_texts),
+    **dict.fromkeys((".yaml", ".yml", ".clang-format", ".clang-tidy"), yaml_texts),
+}
+
+
+def reader_of(path):
+    """The function that yields the texts of a file, or None if it is of no known kind."""
+    ending = path.with_suffix("").suffix if path.suffix == ".in" else path.suffix
+    reader = READERS.get(path.name) or READERS.get(ending)
+    if reader or path.suffix:
+        return reader
+    with path.open("rb") as file:
+        program = file.readline()
+    if not program.startswith(b"#!"):
+        return None
+    return python_texts if b"python" in program else shell_texts
