@@ -3,6 +3,7 @@
 #include "kernel/geometry/surface.h"
 
 #include "compile/box.h"
+#include "compile/context_of.h"
 #include "compile/coplanar.h"
 
 #include <algorithm>
@@ -18,7 +19,7 @@ namespace {
 using namespace kernel;
 
 constexpr double kLeastError = 1e-3;
-constexpr std::size_t kSurfaces = 64, kPointLights = 4096, kOfAMesh = 8;
+constexpr std::size_t kSurfaces = 64, kLights = 4096, kOfAMesh = 8;
 
 Vec3d inDouble(const float* v) {
     return {static_cast<double>(v[0]), static_cast<double>(v[1]), static_cast<double>(v[2])};
@@ -44,9 +45,7 @@ struct LitFrom {
 
 class Search {
 public:
-    explicit Search(const CompiledScene& scene) {
-        context_.blob = scene.data();
-        context_.scene = &scene.header();
+    explicit Search(const CompiledScene& scene) : context_(contextOf(scene)) {
         triangles_ = CRT_ARRAY(CrtTriangle, context_.blob, context_.scene->triangles);
         primitives_ = CRT_ARRAY(CrtPrimitive, context_.blob, context_.scene->primitives);
         faces_ = CRT_ARRAY(CrtFace, context_.blob, context_.scene->faces);
@@ -82,7 +81,7 @@ public:
     }
 
     /// The emitters of each object together: a lamp that stands on a floor is near to it at one end alone.
-    std::vector<LitFrom> emitters(std::uint64_t count) const {
+    std::vector<LitFrom> emitters() const {
         struct Part {
             Box box;
             Vec3d front{};
@@ -90,10 +89,10 @@ public:
         };
         std::map<std::uint32_t, Part> parts;
         const auto* lights = CRT_ARRAY(CrtLight, context_.blob, context_.scene->lights);
-        for (std::uint32_t slot = 0; count > 0 && slot < context_.scene->triangle_count; ++slot) {
+        for (std::uint32_t slot = 0; slot < context_.scene->triangle_count; ++slot) {
             const CrtTriangle& triangle = triangles_[slot];
             if (triangle.shape >= CRT_SLOT_INSTANCE || primitives_[triangle.id].light == CRT_NONE) continue;
-            Part& part = parts[objectOf(surfaceOf(slot))];
+            Part& part = parts[objectOf(slot)];
             const Corners c = cornersOf(context_.blob, slot);  // Of a shape those of its box.
             for (const Vec3d& corner : c.p) part.box.add(corner, 0);
             const bool one_sided = (lights[primitives_[triangle.id].light].flags & CRT_LIGHT_TWO_SIDED) == 0;
@@ -113,7 +112,7 @@ public:
     /// Of a surface from a light that shines on it from right above; 0: it does not, or lies in it.
     double height(const Surface& surface, const LitFrom& light) const {
         const CrtTriangle& triangle = triangles_[surface.slot];
-        if (objectOf(surface) == light.object) return 0;
+        if (objectOf(surface.slot) == light.object) return 0;
         if (surface.instance == 0 && triangle.shape != 0)
             return heightOverShape(shapes_[triangle.shape - 1], light.point);
         std::array<Vec3d, 3> p;
@@ -129,12 +128,11 @@ public:
     }
 
     /// Of an instance that of its mesh.
-    std::uint32_t primitiveOf(const Surface& surface) const { return triangles_[surface.slot].id; }
+    std::uint32_t primitiveOf(std::uint32_t slot) const { return triangles_[slot].id; }
 
 private:
-    static Surface surfaceOf(std::uint32_t slot) { return {slot, 0, 0}; }
-    std::uint32_t objectOf(const Surface& surface) const {
-        return primitives_[primitiveOf(surface)].object & ~CRT_PRIMITIVE_TOUCHES;
+    std::uint32_t objectOf(std::uint32_t slot) const {
+        return primitives_[primitiveOf(slot)].object & ~CRT_PRIMITIVE_TOUCHES;
     }
 
     /// Of each mesh that is instanced, by its first primitive, the slots of its largest triangles.
@@ -176,7 +174,7 @@ private:
         return std::abs(radius - static_cast<double>(shape.radius));
     }
 
-    CrtContext context_{};
+    const CrtContext context_;
     const CrtTriangle* triangles_;
     const CrtPrimitive* primitives_;
     const CrtFace* faces_;
@@ -187,9 +185,12 @@ private:
 
 std::optional<LargeSurface> findLargeSurface(const CompiledScene& scene, const std::vector<Vec3d>& lights) {
     const Search search(scene);
-    std::vector<LitFrom> from = search.emitters(scene.emitters);
-    for (std::size_t i = 0; i < lights.size(); i += lights.size() / kPointLights + 1)
-        from.push_back({(lights[i] - scene.centre) * std::ldexp(1.0, scene.scale_exponent)});
+    std::vector<LitFrom> all;
+    if (scene.emitters > 0) all = search.emitters();
+    for (const Vec3d& light : lights)
+        all.push_back({(light - scene.centre) * std::ldexp(1.0, scene.scale_exponent)});
+    std::vector<LitFrom> from;  // The time is bounded.
+    for (std::size_t i = 0; i < all.size(); i += all.size() / kLights + 1) from.push_back(all[i]);
     std::optional<LargeSurface> worst;
     double largest = kLeastError;
     for (const Surface& surface : search.surfaces())
@@ -198,7 +199,7 @@ std::optional<LargeSurface> findLargeSurface(const CompiledScene& scene, const s
             const double distance = std::max(height, light.radius);
             if (!(height > 0) || 2 * surface.clearance <= largest * distance) continue;
             largest = 2 * surface.clearance / distance;
-            worst = {search.primitiveOf(surface), std::ldexp(surface.clearance, -scene.scale_exponent),
+            worst = {search.primitiveOf(surface.slot), std::ldexp(surface.clearance, -scene.scale_exponent),
                      std::ldexp(height, -scene.scale_exponent), largest};
         }
     return worst;

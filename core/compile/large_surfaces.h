@@ -20,9 +20,9 @@ struct LargeSurface {
 };
 
 /// The surface with the largest error above a thousandth; nothing where there is none. `lights`: the
-/// positions of point lights, in the author's units. Asked are an even choice of 4,096 of them, all objects
-/// that emit, and the 64 surfaces with the largest clearance, among them the eight largest triangles of each
-/// mesh that is instanced.
+/// positions of point lights, in the author's units. Asked are an even choice of 4,096 of these and of the
+/// objects that emit, and the 64 surfaces with the largest clearance, among them the eight largest triangles
+/// of each mesh that is instanced.
 std::optional<LargeSurface> findLargeSurface(const CompiledScene& scene, const std::vector<Vec3d>& lights);
 
 }  // namespace crt

@@ -6,6 +6,7 @@
 #include "base/parallel.h"
 #include "base/vec3d.h"
 #include "compile/box.h"
+#include "compile/context_of.h"
 #include "compile/coplanar.h"
 
 #include <algorithm>
@@ -17,13 +18,6 @@
 
 namespace crt {
 namespace {
-
-kernel::CrtContext contextOf(const CompiledScene& scene) {
-    kernel::CrtContext context{};
-    context.blob = scene.data();
-    context.scene = &scene.header();
-    return context;
-}
 
 /// Triangles that are asked at most, in large scenes an even choice of them.
 constexpr std::uint64_t kTriangles = 10000;

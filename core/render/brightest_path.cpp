@@ -4,6 +4,8 @@
 #include "kernel/materials/composition.h"
 #include "kernel/transport/direct_light.h"
 
+#include "compile/context_of.h"
+
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -40,9 +42,7 @@ struct LitPath {
 /// Points on the surfaces of a scene, and the light that they scatter.
 class SurfacePoints {
 public:
-    explicit SurfacePoints(const CompiledScene& scene) {
-        context_.blob = scene.data();
-        context_.scene = &scene.header();
+    explicit SurfacePoints(const CompiledScene& scene) : context_(contextOf(scene)) {
         triangles_ = CRT_ARRAY(CrtTriangle, context_.blob, context_.scene->triangles);
     }
 

@@ -63,17 +63,19 @@ BROKEN = {
     "core/broken.mutant": ("Mutation: a\nBreaks: It has a loop\n  of\n  its own.\n", (3,)),
     "docs/broken.ipynb": (TEXT_CELL.replace("{}", 'A loop of\\n",\n"its own.'), (3,)),
 }
+# Text that is code; @ stands for a word that no sentence may have.
 CODE = {
-    "docs/code.md": "```\nNobody may differ.\n```\n\n    Nobody may differ.\n\n`Nobody`\n",
-    "docs/code.ipynb": TEXT_CELL.replace("{}", "```\\n\",\n\"Nobody may differ.\\n\",\n\"```"),
-    "core/code.html": ("<!DOCTYPE nobody><style>Nobody {}</style><script>nobody()</script>\n"
-                       "<pre>Nobody</pre><h2>What is listed</h2>\n"
-                       '<p class="Nobody may">{% if nobody %}{{ nobody }}{% endif %}</p>\n'),
-    "core/code.yaml": "a: Nobody\nb: 'it # Nobody may differ.'\nc: [\"# Nobody\"]\n",
-    "core/code.sh": "echo $# 'it # Nobody may' nobody#Nobody\n",
-    "core/code.mutant": "Mutation: nobody\nKilled-by: unit Nobody\n\nIn: a b\n- nobody\n+ b /* No one */\n",
-    "core/code": "Nobody is no script.\n",
+    "docs/code.md": "```\n@ may differ.\n```\n\n    @ may differ.\n\n`@`\n",
+    "docs/code.ipynb": TEXT_CELL.replace("{}", "```\\n\",\n\"@ may differ.\\n\",\n\"```"),
+    "core/code.html": ("<!DOCTYPE @><style>@ {}</style><script>@()</script>\n"
+                       "<pre>@</pre><h2>What is listed</h2>\n"
+                       '<p class="@ may">{% if @ %}{{ @ }}{% endif %}</p>\n'),
+    "core/code.yaml": "a: @\nb: 'it # @ may differ.'\nc: [\"# @\"]\n",
+    "core/code.sh": "echo $# 'it # @ may' @#@\n",
+    "core/code.mutant": "Mutation: @\nKilled-by: unit @\n\nIn: a b\n- @\n+ b /* @ */\n",
+    "core/code": "@ is no script.\n",
 }
+CODE = {name: text.replace("@", PLANTED["person"][0].split()[0]) for name, text in CODE.items()}
 
 
 def check(files):
