@@ -285,6 +285,10 @@ TEST_CASE("every feature bit is set by some scene, and by nothing else", "[compi
             [](Scene& s) { s.emissions[0].radiance = crt::constantSpectrum(0); });
     // Nothing is scattered at depth 0.
     differs(0, CRT_FEATURE_DIFFUSE | CRT_FEATURE_NEE, [](Scene& s) { s.integrator.max_depth = 0; });
+    // As many as the state of a path can count.
+    Scene endless = litFloor();
+    endless.integrator.max_depth = 1'000'000'000;
+    CHECK(compiled(endless).header().max_depth == CRT_MOST_EVENTS);
     // But the albedo is asked for.
     Scene flat = litFloor();
     flat.integrator.max_depth = 0;

@@ -130,8 +130,10 @@ TEST_CASE("a huge range neither overflows nor is cut into nothing", "[launch_pac
 }
 
 TEST_CASE("slices fill a device with few pixels, and cost no more memory than allowed", "[launch_pacer]") {
-    using crt::gpu::chooseSlices;
     // 1000 blocks at once, filled 16 times.
+    const auto chooseSlices = [](auto blocks, auto resident, auto samples, auto most) {
+        return crt::gpu::chooseSlices(blocks, resident, 16, samples, most);
+    };
     CHECK(chooseSlices(16'000, 1000, 1 << 20, 1000) == 1);
     CHECK(chooseSlices(1000, 1000, 1 << 20, 1000) == 16);
     CHECK(chooseSlices(10, 1000, 1 << 20, 1000) == 1000);  // as many as memory allows, of 1600

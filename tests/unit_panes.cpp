@@ -39,9 +39,13 @@ double transmittance(double cosine, double eta) {
 struct Stack {
     crt::CompiledScene compiled;
     CrtContext ctx;
+    explicit Stack(const crt::Scene& scene)
+        : compiled(crt::compileScene(scene, 0)), ctx(contextOf(compiled)) {}
     explicit Stack(const std::string& material, int sheets, const std::string& more = "")
-        : compiled(crt::compileScene(crt::parseScene(text(material, sheets, more), "scene.yaml", ""), 0)),
-          ctx(contextOf(compiled)) {}
+        : Stack(parsed(material, sheets, more)) {}
+    static crt::Scene parsed(const std::string& material, int sheets, const std::string& more = "") {
+        return crt::parseScene(text(material, sheets, more), "scene.yaml", "");
+    }
     static std::string text(const std::string& material, int sheets, const std::string& more) {
         std::string scene = fmt::format(
             "crt: 1\ncamera: {{position: [0, 0.1, 0.1], target: [0, 0, 0], fov: 0.001}}\n"
@@ -62,11 +66,14 @@ struct Stack {
     }
     /// Mean luminance of this number of samples of the pixel.
     double seen(std::uint64_t samples) const {
+        CrtRayCount rays{0, 0};
+        return seen(samples, &rays);
+    }
+    double seen(std::uint64_t samples, CrtRayCount* rays) const {
         std::vector<f64> sums(2 * ctx.scene->channels);
         u64 count = 0;
-        CrtRayCount rays{0, 0};
         crt_render_pixel(&ctx, 0, 0, 0, static_cast<u32>(samples), sums.data(), &count, nullptr, nullptr,
-                         &rays);
+                         rays);
         return (sums[2] + sums[3]) / static_cast<double>(count);
     }
 };
@@ -97,8 +104,9 @@ TEST_CASE("pane: all rounds between its sides, each polarisation by itself", "[p
 }
 
 TEST_CASE("pane: a film on one side", "[pane]") {
+    // Through a film of 0.8 light tunnels beyond 53°.
     for (const double degrees : {0.0, 60.0, 80.0})
-        for (const double film : {1.33, 2.2})
+        for (const double film : {1.33, 2.2, 0.8})
             for (const double thickness : {50.0, 400.0}) {
                 const double cosine = std::cos(degrees * kPi / 180);
                 const double kernel =
@@ -120,6 +128,24 @@ TEST_CASE("pane: a shadow ray passes any number of them", "[pane]") {
         CHECK(Stack("{type: thin_dielectric, ior: 1.5}", sheets).seen(16) / open ==
               Approx(std::pow(once, sheets)).epsilon(1e-5 + 1e-6 * sheets));
     }
+}
+
+TEST_CASE("pane: roulette counts those that a path has passed", "[pane]") {
+    // All light passes an index of 1. The floor reflects a tenth, so that roulette lets a tenth of the paths
+    // go on: 409.6 of 4096, with a standard error of 19.
+    constexpr u32 kSamples = 4096;
+    const auto reflected = [](int panes) {
+        crt::Scene scene = Stack::parsed("{type: thin_dielectric, ior: 1}", panes);
+        scene.camera.position = {0, 9, 0.1};
+        scene.materials[0].reflectance = crt::constantSpectrum(0.1);
+        scene.integrator.max_depth = 2;
+        scene.sampler.type = crt::SamplerType::Independent;
+        CrtRayCount rays{0, 0};
+        (void)Stack(scene).seen(kSamples, &rays);
+        return static_cast<double>(rays.closest - kSamples);
+    };
+    for (const int few : {0, 2}) CHECK(reflected(few) == kSamples);
+    for (const int many : {3, 7, 40}) CHECK(reflected(many) == Approx(409.6).margin(80));
 }
 
 TEST_CASE("pane: each sampler finds the same of mixes and of panes that are there in part", "[pane]") {

@@ -134,7 +134,7 @@ void setIntegrator(const Scene& scene, kernel::CrtScene& header) {
     }
     header.seed = kernel::crt_seed(static_cast<std::uint32_t>(scene.sampler.seed),
                                    static_cast<std::uint32_t>(scene.sampler.seed >> 32));
-    header.max_depth = static_cast<std::uint32_t>(scene.integrator.max_depth);
+    header.max_depth = std::min(static_cast<std::uint32_t>(scene.integrator.max_depth), CRT_MOST_EVENTS);
     header.roulette_depth =
         scene.integrator.roulette ? static_cast<std::uint32_t>(scene.integrator.roulette_depth) : CRT_NONE;
     header.nee = !scene.integrator.nee ? CRT_NEE_NONE : scene.integrator.mis ? CRT_NEE_MIS : CRT_NEE_ONLY;

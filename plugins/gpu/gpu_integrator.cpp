@@ -16,8 +16,8 @@ using plugin::PluginError;
 
 namespace {
 
-/// Wanted duration of a wave, whose last passes have few paths left.
-constexpr double kWaveSeconds = 0.2;
+/// Wanted duration of a wave: long, because its last passes have few paths left.
+constexpr double kWaveSeconds = 0.6;
 /// Pairs of ray counters, as in kernels.h.
 constexpr std::uint32_t kRayCounters = 1024;
 
@@ -189,8 +189,9 @@ void GpuIntegrator::launchKernels(const std::vector<GpuKernel>& kernels, const L
             waves ? wavefront_->mostSlices(across) : std::numeric_limits<std::uint32_t>::max();
         const std::uint64_t most = sliceBudget(device.memory_bytes, device.memory_bytes) /
                                    std::max<std::uint64_t>(film_.bytes(), 1);
-        slices = ensureSlices(
-            chooseSlices(blocks, first.resident_blocks, launch.sample_count, std::min(most, fitting)));
+        const std::uint64_t fillings = waves ? kWaveFillings : kFillings;
+        slices = ensureSlices(chooseSlices(blocks, first.resident_blocks, fillings, launch.sample_count,
+                                           std::min(most, fitting)));
         slices = static_cast<std::uint32_t>(std::min<std::uint64_t>(slices, fitting));
     }
 

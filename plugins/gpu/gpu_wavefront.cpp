@@ -15,6 +15,8 @@ namespace {
 constexpr std::uint64_t kMostSlots = std::uint64_t{1} << 22;
 /// Between two looks at how many slots are done. A pass without any costs a few microseconds.
 constexpr std::uint64_t kPassesAtOnce = 4;
+/// The same while no slot can be done: some tens of milliseconds, so that the host may stop the wave.
+constexpr std::uint64_t kFirstPassesAtOnce = 16;
 
 /// As kernels see it; the host cannot read there, and a kernel of OpenCL lays out the wave again.
 template <class T>
@@ -119,14 +121,13 @@ void Wavefront::runWave(const std::vector<GpuKernel>& kernels, const kernel::Crt
     device_.fill(words_, 0, (words - lengths) * kWord, lengths * kWord);
     if (header_.handle != nullptr) device_.write(header_, &wave);
     // No sample takes fewer passes than one, and the last is added in one more.
-    std::uint64_t passes = divideUp(wave.sample_count, wave.slices) + 1;
-    std::uint32_t number = 0, done = 0;
-    for (;;) {
-        for (; passes != 0; --passes) runPass(kernels, wave, target, number++);
+    const std::uint64_t least = divideUp(wave.sample_count, wave.slices) + 1;
+    for (std::uint32_t pass = 0, done = 0;;) {
+        std::uint64_t more = pass < least ? std::min(least - pass, kFirstPassesAtOnce) : kPassesAtOnce;
+        for (; more != 0; --more) runPass(kernels, wave, target, pass++);
         device_.read(words_, &done, (words - 1) * kWord, kWord);
         if (done >= wave.slots) return;
         meanwhile();
-        passes = kPassesAtOnce;
     }
 }
 

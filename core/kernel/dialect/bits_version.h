@@ -14,11 +14,12 @@
  *   5   interpolated normals keep the light of surfaces that reflect
  *   6   nodes of the tree of lights have four children
  *   7   a sphere that shines is not sampled from its own surface
- *   8  rays pass panes, bodies know what surrounds them, small things keep their digits in large scenes
+ *   8   rays pass panes, bodies know what surrounds them, small things keep their digits in large scenes
+ *   9   roulette counts the panes that a path has passed
  */
 #ifndef CRT_BITS_VERSION_H
 #define CRT_BITS_VERSION_H
 
-#define CRT_BITS_VERSION 8u
+#define CRT_BITS_VERSION 9u
 
 #endif

@@ -21,6 +21,7 @@ CRT_KERNEL_BEGIN
 
 #define CRT_SCENE_MAGIC 0x53545243u /* "CRTS" */
 #define CRT_NONE 0xffffffffu
+#define CRT_MOST_EVENTS 0x3ffffffu /* that the state of a path can count (path_state.h) */
 
 #define CRT_WAVELENGTH_MIN_NM 360.0f
 #define CRT_WAVELENGTH_COUNT 471u     /* 360, 361, … 830 nm */
@@ -475,7 +476,7 @@ typedef struct CrtScene {
     u32 replicate_shift;         /* there are 2^shift replicates; 0: one sequence */
     u32 sampler;
 
-    u32 max_depth;               /* scattering events */
+    u32 max_depth;               /* scattering events, up to CRT_MOST_EVENTS */
     u32 roulette_depth;          /* CRT_NONE: never */
     u32 nee;
     CrtValue environment;        /* its radiance, of an image per unit of its texels; or CRT_NONE */

@@ -68,6 +68,7 @@ CRT_FN int crt_path_advance_passing(const CrtContext *ctx, CrtPath *path, CrtRay
             hit.t = hit.t + dot3(ray.o - path->ray.o, ray.d); /* from where the path's ray began */
             path->throughput = way.carried;
             path->met = way.material;
+            path->panes = crt_count_panes(path->panes, way.panes);
         }
         const u32 depth = path->depth;
         alive = crt_shade(ctx, path, hit, &shadow);

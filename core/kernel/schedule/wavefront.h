@@ -183,6 +183,7 @@ CRT_FN int crt_wave_passes(const CrtContext *ctx, const CrtWave *wave, u32 slot)
         *crt_row(wave, CRT_ROW_THROUGHPUT, slot) = way.carried;
         CRT_GLOBAL vec4 *ids = crt_row(wave, CRT_ROW_HIT_IDS, slot);
         *ids = make_vec4(V4X(*ids), V4Y(*ids), crt_from_bits(way.material), 0.0f);
+        if (way.panes != 0u) crt_store_panes(wave, slot, way.panes);
     }
     if (passes)
         *crt_row(wave, CRT_ROW_PASSED, slot) = crt_row_of(shadow ? way.d : ray.o, crt_from_bits(way.passed));

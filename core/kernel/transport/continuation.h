@@ -36,12 +36,12 @@ CRT_FN int crt_continue(const CrtContext *ctx, CrtPath *path, const CrtVertex *v
     return 1;
 }
 
-/* Russian roulette on the spectral maximum. Returns 0 where the path ends; a path that carries no light
-   always ends. */
+/* Russian roulette on the spectral maximum, after `roulette_depth` events and panes. Returns 0 where the
+   path ends; a path that carries no light always ends. */
 CRT_FN int crt_roulette(const CrtContext *ctx, CrtPath *path, u32 dimension) {
     const f32 carried = max4(path->throughput) * path->eta_square;
     if (!(carried > 0.0f)) return 0;
-    if (path->depth >= ctx->scene->roulette_depth && carried < 1.0f) {
+    if (path->depth + path->panes >= ctx->scene->roulette_depth && carried < 1.0f) {
         const f32 survive = crt_max(carried, 0.05f);
         if (!(crt_sample_1d(&path->sampler, dimension + CRT_DIM_ROULETTE) < survive)) return 0;
         path->throughput = path->throughput / survive;

@@ -2,7 +2,7 @@
  * passing.h: surfaces that a ray can pass without a scattering event: surfaces with opacity below 1, and
  * panes. The path keeps its last vertex, and with it the densities that weigh light sampling against
  * scattered rays, because both techniques see a light through the same surfaces. Passing counts neither
- * towards the depth nor as another ray.
+ * towards the depth nor as another ray. Roulette counts panes, because each costs another search.
  *
  * A pane transmits T(θ, λ) (pane.h). A shadow ray multiplies the light that it tests by T. A path's ray
  * passes with probability q, the mean of T over its wavelengths, and then carries T/q. Otherwise it stops,
@@ -27,6 +27,7 @@ CRT_FN int crt_is_passable(const CrtContext *ctx) {
 typedef struct CrtPassage {
     u32 dimension; /* where its random numbers begin */
     u32 passed;    /* surfaces so far */
+    u32 panes;     /* of them, panes */
     int shadow;    /* nothing is mirrored */
     u32 media;     /* around the ray where it begins (medium.h) */
     u32 material;  /* in scenes with panes, what a mix that stops the ray is found to be of; or CRT_NONE */
@@ -41,6 +42,7 @@ CRT_FN CrtPassage crt_passage(u32 dimension, int shadow, vec3 d, vec4 position, 
     CrtPassage way;
     way.dimension = dimension;
     way.passed = 0u;
+    way.panes = 0u;
     way.shadow = shadow;
     way.media = media;
     way.material = CRT_NONE;
@@ -125,6 +127,7 @@ CRT_FN int crt_passes(const CrtContext *ctx, CrtHit hit, CrtSampler *sampler, Cr
             way->material = material =
                 crt_chosen_material(ctx, &surface, ray->d, sampler, dimension + CRT_DIM_PANE_MIX);
         passes = crt_passes_pane(ctx, &surface, material, sampler, dimension, way);
+        way->panes += (u32)passes;
     }
     if (!passes) return 0;
     *ray = crt_ray_behind(*ray, surface.p, surface.clearance, surface.ng);

@@ -25,6 +25,7 @@ CRT_KERNEL_BEGIN
 
 /*
  *   depth           scattering events so far
+ *   panes           that the path has passed, up to CRT_PANES_COUNTED
  *   hero            1 in the lane of the hero wavelength, 0 elsewhere
  *   alone           only the hero wavelength is alive
  *   p               where the path was scattered: a clearance off the ray's origin
@@ -36,7 +37,7 @@ CRT_KERNEL_BEGIN
  *   side            crt_scattering_side (vertex.h) of the vertex at p
  */
 #define CRT_PATH_STATE(VERTEX, TREE, BEGIN, FIRST)                                              \
-    VERTEX(ORIGIN, CrtRay ray; u32 depth; vec4 hero; int alone;, V3(ray.o, WORD))               \
+    VERTEX(ORIGIN, CrtRay ray; u32 depth; u32 panes; vec4 hero; int alone;, V3(ray.o, WORD))    \
     VERTEX(DIRECTION, CrtSampler sampler;, V3(ray.d, NUMBERS))                                  \
     VERTEX(THROUGHPUT, vec4 throughput;, V4(throughput))                                        \
     BEGIN(RADIANCE, vec4 radiance;, V4(radiance))                                               \
@@ -60,16 +61,24 @@ CRT_FN vec4 crt_hero_lane(u32 lane) {
                      lane == 3u ? 1.0f : 0.0f);
 }
 
-/* Depth, hero wavelength and `alone` in one word. */
+#define CRT_PANES_COUNTED 7u
+
+CRT_FN u32 crt_count_panes(u32 before, u32 more) {
+    return before + more < CRT_PANES_COUNTED ? before + more : CRT_PANES_COUNTED;
+}
+
+/* Depth, panes, hero wavelength and `alone` in one word. */
 CRT_FN u32 crt_path_word(const CrtPath *path) {
-    u32 word = path->depth | (path->alone ? 0x80000000u : 0u);
+    u32 word = path->depth | path->panes << 26 | (path->alone ? 0x80000000u : 0u);
     if (CRT_HAS(DISPERSION))
         word |= (u32)(V4Y(path->hero) + 2.0f * V4Z(path->hero) + 3.0f * V4W(path->hero)) << 29;
     return word;
 }
-CRT_FN u32 crt_depth_of_word(u32 word) { return word & 0x1fffffffu; }
+CRT_FN u32 crt_depth_of_word(u32 word) { return word & CRT_MOST_EVENTS; }
+CRT_FN u32 crt_panes_of_word(u32 word) { return word >> 26 & CRT_PANES_COUNTED; }
 CRT_FN void crt_set_path_word(CrtPath *path, u32 word) {
     path->depth = crt_depth_of_word(word);
+    path->panes = crt_panes_of_word(word);
     path->hero = crt_hero_lane(CRT_HAS(DISPERSION) ? word >> 29 & 3u : 0u);
     path->alone = word >> 31 != 0u;
 }

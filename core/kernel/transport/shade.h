@@ -33,6 +33,7 @@ CRT_FN void crt_path_begin(const CrtContext *ctx, CrtPath *path, u32 x, u32 y, u
     if (CRT_HAS(LIGHT_TREE)) path->side = make_vec3(0.0f, 0.0f, 0.0f);
     path->eta_square = 1.0f;
     path->depth = 0u;
+    path->panes = 0u;
     path->alone = 0;
     path->met = CRT_NONE;
     path->media = CRT_HAS(MEDIA) ? scene->camera_media : 0u;

@@ -360,13 +360,15 @@ SectionSchema integrator() {
                  .fallback = yaml(d.max_depth),
                  .doc = "Longest path; 0 shows emitters only, 1 is direct light. To pass a "
                         "pane or a hole does not count; to cross a body of glass is 2. crt warns where "
-                        "the camera looks through more glass than this allows."},
+                        "the camera looks through more glass than this allows. No path has more than "
+                        "67108863 events."},
                 {.name = "roulette_depth",
                  .kind = Kind::Integer,
                  .range = {0, 1e9, false, false},
                  .unit = "scattering events",
                  .fallback = yaml(d.roulette_depth),
-                 .doc = "First event after which Russian roulette may end a path."},
+                 .doc = "First event after which Russian roulette may end a path. Here, panes that the path "
+                        "has passed (up to 7) count as events."},
                 {.name = "roulette",
                  .kind = Kind::Boolean,
                  .fallback = yaml(d.roulette),
