@@ -170,8 +170,8 @@ SceneTrait geometryTrait(const Scene& scene) {
 
 SceneTrait materialsTrait(const Scene& scene) {
     Digest digest;
-    for (const Material& material : scene.materials)
-        visitMembers(material, [&digest](const auto& member) { digest.add(member); });
+    const auto add = [&digest](const auto& member) { digest.add(member); };
+    for (const Material& material : scene.materials) visitMembers(material, add);
     return {"the materials", counted(scene.materials.size(), "material", "materials"), digest.digits()};
 }
 
@@ -227,23 +227,8 @@ SceneTrait lightsTrait(const Scene& scene) {
             add_axes(sky->axes);
         }
     }
-    for (const PointLight& light : scene.point_lights) {
-        digest.add(light.type);
-        digest.add(light.spectrum);
-        digest.add(light.strength);
-        for (const double x : {light.position[0], light.position[1], light.position[2], light.direction[0],
-                               light.direction[1], light.direction[2], light.cone_angle_deg,
-                               light.penumbra_deg, light.angular_diameter_deg})
-            digest.add(x);
-        if (light.type == PointLightType::Ies)
-            for (const std::vector<double>* values :
-                 {&light.ies->vertical_deg, &light.ies->horizontal_deg, &light.ies->candela})
-                digest.add(*values);
-        if (light.type == PointLightType::Ies || light.type == PointLightType::Beam)
-            for (const double x : {light.across[0], light.across[1], light.across[2], light.radius,
-                                   light.width, light.height})
-                digest.add(x);
-    }
+    const auto add = [&digest](const auto& member) { digest.add(member); };
+    for (const PointLight& light : scene.point_lights) visitMembers(light, add);
     const std::string without_surface =
         scene.point_lights.empty()
             ? std::string()

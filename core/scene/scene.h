@@ -325,6 +325,22 @@ struct PointLight {
     SourcePlace place;
 };
 
+/// Calls visit(member) for the members that decide what the light of a light is.
+template <class Visit>
+void visitMembers(const PointLight& light, const Visit& visit) {
+    const auto& [name, type, spectrum, strength, position, direction, cone_angle_deg, penumbra_deg,
+                 angular_diameter_deg, ies, across, radius, width, height, place] = light;
+    visit(type);
+    visit(spectrum);
+    for (const Vec3d* vector : {&position, &direction, &across})
+        for (const double x : *vector) visit(x);
+    for (const double number :
+         {strength, cone_angle_deg, penumbra_deg, angular_diameter_deg, radius, width, height})
+        visit(number);
+    if (ies)
+        for (const auto* values : {&ies->vertical_deg, &ies->horizontal_deg, &ies->candela}) visit(*values);
+}
+
 /// Frame of a distant light: perpendicular unit vectors.
 struct Axes {
     Vec3d right{1, 0, 0}, up{0, 1, 0}, ahead{0, 0, -1};
