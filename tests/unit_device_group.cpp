@@ -187,7 +187,7 @@ TEST_CASE("a device that failed is opened again by the next render of a scene", 
     const Listener listener([](LogLevel, std::string_view) {}, LogLevel::Error,
                             [&](const std::string& stage) { opens += stage == "opening the backend"; });
     const ListenerScope scope(listener);
-    SceneOnDevices on_devices(scene, options);
+    SceneRenderer on_devices(scene, options);
     const SamplingPlan plan = planSamples(options, scene, {});
     Watch watch;
     const Rendered first = on_devices.render(plan, std::nullopt, watch);

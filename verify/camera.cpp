@@ -142,19 +142,20 @@ void pixelFilters(Context& context) {
                       fmt::format("[[{0},{1},1],[9,{1},1],[9,9,1],[{0},9,1]]", corner_x, corner_y), "black",
                       "1, two_sided: true")
                 .yaml();
-        std::vector<Asked> asked;
+        std::vector<Quantity> quantities;
         for (std::uint32_t y = 0; y < size; ++y)
             for (std::uint32_t x = 0; x < size; ++x) {
                 // Image right is −x. 1 + the share of light: no interval is relative to 0.
                 const double in_x = filter.below((1 - pixel * (x + 0.5) - corner_x) / pixel),
                              in_y = filter.below((1 - pixel * (y + 0.5) - corner_y) / pixel);
                 if (x + y < 5 || x + y > 9) continue;
-                asked.push_back({fmt::format("filter {}, pixel ({}, {})", filter.film, x, y),
-                                 [x, y](const std::vector<Film>& f) { return 1 + radiance(f[0], x, y); },
-                                 1 + in_x * in_y});
+                quantities.push_back(
+                    {fmt::format("filter {}, pixel ({}, {})", filter.film, x, y),
+                     [x, y](const std::vector<Film>& f) { return 1 + radiance(f[0], x, y); },
+                     1 + in_x * in_y});
             }
         std::vector<Outcome> outcomes =
-            context.estimated(asked, {scene}, 0.005, {.samples = 64, .most = 16384}, {});
+            context.estimated(quantities, {scene}, 0.005, {.samples = 64, .most = 16384}, {});
         // Of each filter the worst pixel; one that fails before one that passes.
         const auto off = [](const Outcome& o) { return std::abs(*o.measured - *o.expected); };
         const auto worst =

@@ -192,10 +192,10 @@ void randomTriangles(Context& context) {
                 .quad("floor", "[[-4,0,-4],[-4,0,4],[4,0,4],[4,0,-4]]", "floor")
                 .mesh("lamp", "[" + positions + "]", "[[0,1,2]]", "black", "1, two_sided: true")
                 .yaml();
-        const Asked asked{fmt::format("the worst of {} triangles, number {}", count, i),
-                          [](const std::vector<Film>& f) { return radiance(f.front()); }, expected};
+        const Quantity quantity{fmt::format("the worst of {} triangles, number {}", count, i),
+                                [](const std::vector<Film>& f) { return radiance(f.front()); }, expected};
         const Outcome o =
-            context.estimated({asked}, {scene}, 0.003, {.samples = 256, .most = 65536}, {}).front();
+            context.estimated({quantity}, {scene}, 0.003, {.samples = 256, .most = 65536}, {}).front();
         const auto badness = [](const Outcome& x) {
             return std::pair(x.verdict, std::abs(*x.measured / *x.expected - 1));
         };

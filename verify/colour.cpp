@@ -259,12 +259,13 @@ void heroWavelength(Context& context) {
          {std::pair{"N-BK7", "{glass: N-BK7}"},
           {"diamond", "{glass: diamond}"},
           {"an index of 1.5 to 1.5000002", "{table: {nm: [360, 830], value: [1.5, 1.5000002]}}"}}) {
-        std::vector<Asked> asked;
+        std::vector<Quantity> quantities;
         for (std::size_t c = 0; c < 3; ++c)
-            asked.push_back({fmt::format("{}: {} against the bare light", name, "XYZ"[c]),
-                             [c](const std::vector<Film>& f) { return meanXyz(f[0])[c] / meanXyz(f[1])[c]; },
-                             1});
-        context.estimate(asked, {cubeInLight(ior), cubeInLight("")}, 0.005, {.samples = 4096, .most = 65536},
+            quantities.push_back(
+                {fmt::format("{}: {} against the bare light", name, "XYZ"[c]),
+                 [c](const std::vector<Film>& f) { return meanXyz(f[0])[c] / meanXyz(f[1])[c]; }, 1});
+        context.estimate(quantities, {cubeInLight(ior), cubeInLight("")}, 0.005,
+                         {.samples = 4096, .most = 65536},
                          {{0.25, "the hero's weight of four is missing"},
                           {4, "the hero's weight of four is applied, but the others live on"}});
     }

@@ -165,7 +165,7 @@ void Context::equivalent(const std::string& what,
     }
 }
 
-std::vector<Outcome> Context::estimated(const std::vector<Asked>& asked,
+std::vector<Outcome> Context::estimated(const std::vector<Quantity>& quantities,
                                         const std::vector<std::string>& scenes, double delta,
                                         const Effort& effort, const std::vector<Mistake>& mistakes) {
     std::vector<Scene> parsed;
@@ -189,11 +189,11 @@ std::vector<Outcome> Context::estimated(const std::vector<Asked>& asked,
             }
         there = wanted;
         std::vector<Outcome> outcomes;
-        for (const Asked& question : asked) {
+        for (const Quantity& quantity : quantities) {
             std::vector<double> replicates;
-            for (const std::vector<Film>& of_seed : films) replicates.push_back(question.measure(of_seed));
+            for (const std::vector<Film>& of_seed : films) replicates.push_back(quantity.measure(of_seed));
             outcomes.push_back(
-                equivalenceOutcome(question.what, replicates, question.expected, delta, mistakes));
+                equivalenceOutcome(quantity.what, replicates, quantity.expected, delta, mistakes));
             outcomes.back().note = fmt::format("{} seeds × {} samples a pixel", seeds, there);
         }
         const bool told = std::none_of(outcomes.begin(), outcomes.end(),
@@ -202,9 +202,9 @@ std::vector<Outcome> Context::estimated(const std::vector<Asked>& asked,
     }
 }
 
-void Context::estimate(const std::vector<Asked>& asked, const std::vector<std::string>& scenes, double delta,
-                       const Effort& effort, const std::vector<Mistake>& mistakes) {
-    for (Outcome& outcome : estimated(asked, scenes, delta, effort, mistakes)) add(std::move(outcome));
+void Context::estimate(const std::vector<Quantity>& quantities, const std::vector<std::string>& scenes,
+                       double delta, const Effort& effort, const std::vector<Mistake>& mistakes) {
+    for (Outcome& outcome : estimated(quantities, scenes, delta, effort, mistakes)) add(std::move(outcome));
 }
 
 void Context::estimate(const std::string& what, const std::vector<std::string>& scenes,

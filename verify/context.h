@@ -56,7 +56,7 @@ using Measure = std::function<double(const Film&)>;
 using JointMeasure = std::function<double(const std::vector<Film>&)>;
 
 /// One of several numbers that are made of the same films, and what it should be.
-struct Asked {
+struct Quantity {
     std::string what;
     JointMeasure measure;
     double expected;
@@ -112,11 +112,12 @@ public:
                   const JointMeasure& measure, double expected, double delta, const Effort& effort = {},
                   const std::vector<Mistake>& mistakes = {});
     /// Several numbers of the same films, which are rendered once. Goes on until it can tell of each.
-    void estimate(const std::vector<Asked>& asked, const std::vector<std::string>& scenes, double delta,
-                  const Effort& effort = {}, const std::vector<Mistake>& mistakes = {});
+    void estimate(const std::vector<Quantity>& quantities, const std::vector<std::string>& scenes,
+                  double delta, const Effort& effort = {}, const std::vector<Mistake>& mistakes = {});
     /// The outcomes of an estimate, for cases that keep only the worst of many.
-    std::vector<Outcome> estimated(const std::vector<Asked>& asked, const std::vector<std::string>& scenes,
-                                   double delta, const Effort& effort, const std::vector<Mistake>& mistakes);
+    std::vector<Outcome> estimated(const std::vector<Quantity>& quantities,
+                                   const std::vector<std::string>& scenes, double delta,
+                                   const Effort& effort, const std::vector<Mistake>& mistakes);
     /// The upper end of the 99.9 % Clopper–Pearson interval of the rate of failures is at most `bound`.
     void rate(const std::string& what, std::uint64_t failures, std::uint64_t trials, double bound,
               const std::string& physics);

@@ -107,13 +107,13 @@ void images(Context& context) {
                           "{max_depth: 1, roulette: false, nee: false}"),
                      1, 5e-4);
 
-    struct Asked {
+    struct Image {
         const char* what;
         int rows;
         Grey grey;
         double by_chance;
     };
-    for (const Asked& a : {Asked{"a grey image", 8, even, 0.003},
+    for (const Image& a : {Image{"a grey image", 8, even, 0.003},
                            {"a single bright texel", 16, single, 0},
                            {"a gradient", 32, gradient, 0.003},
                            {"a texel of 1e4 times the rest", 64, contrast, 0}}) {

@@ -135,11 +135,12 @@ void colour(Context& context) {
         cube.reflectance = slope;
         cube.radiance = band;
         cube.integrator = fmt::format("{{max_depth: 1, roulette: false, nee: {}}}", nee);
-        std::vector<Asked> asked;
+        std::vector<Quantity> quantities;
         for (std::size_t c = 0; c < 3; ++c)
-            asked.push_back({fmt::format("{} {} light sampling", "XYZ"[c], nee ? "with" : "without"),
-                             [c](const std::vector<Film>& f) { return meanXyz(f.front())[c]; }, xyz[c]});
-        context.estimate(asked, {yaml(cube)}, 0.01, {.samples = 256, .most = 4096});
+            quantities.push_back({fmt::format("{} {} light sampling", "XYZ"[c], nee ? "with" : "without"),
+                                  [c](const std::vector<Film>& f) { return meanXyz(f.front())[c]; },
+                                  xyz[c]});
+        context.estimate(quantities, {yaml(cube)}, 0.01, {.samples = 256, .most = 4096});
     }
 }
 

@@ -342,7 +342,7 @@ void dispersion(Context& context) {
             .quad("it", "[[-2,0,-2],[-2,0,2],[2,0,2],[2,0,-2]]", "it")
             .quad("bottom", "[[-9,-1,-9],[-9,-1,9],[9,-1,9],[9,-1,-9]]", "black")
             .yaml();
-    std::vector<Asked> asked;
+    std::vector<Quantity> quantities;
     for (std::uint32_t bin = 0; bin < kBins; ++bin) {
         const double width = (kTo - kFrom) / kBins, lower = kFrom + bin * width;
         double expected = 0;
@@ -351,12 +351,11 @@ void dispersion(Context& context) {
             expected += fresnelDielectric(
                             1, cauchyOfAbbe(kMiddle, kAbbe / kScale, lower + width * (i + 0.5) / kParts)) /
                         kParts;
-        asked.push_back(
+        quantities.push_back(
             {fmt::format("Abbe's number {} / {}, {:.0f} to {:.0f} nm", kAbbe, kScale, lower, lower + width),
-             [bin](const std::vector<Film>& films) { return meanOfBin(films[0], bin); },
-             expected});
+             [bin](const std::vector<Film>& films) { return meanOfBin(films[0], bin); }, expected});
     }
-    context.estimate(asked, {scene}, 0.01, {.samples = 256, .most = 65536},
+    context.estimate(quantities, {scene}, 0.01, {.samples = 256, .most = 65536},
                      {{fresnelDielectric(1, kMiddle), "the index is the same at all wavelengths"}});
 }
 

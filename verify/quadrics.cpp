@@ -163,19 +163,19 @@ void lenses(Context& context) {
         const double f = lens.focalLength(at_nm(550));
         Sighting at = sighting(1.3 * f, f, 0.002);
         at.half_frame *= 1.2;
-        std::vector<Asked> asked;
+        std::vector<Quantity> quantities;
         for (std::uint32_t bin = 0; bin < kBins; ++bin) {
             const double width = (kTo - kFrom) / kBins, lower = kFrom + bin * width;
             double mean = 0;
             for (int i = 0; i < 25; ++i)
                 mean += seen(lens.surfaces, at_nm(lower + width * (i + 0.5) / 25), at) / 25;
-            asked.push_back({fmt::format("{} of SF10, f = {:.4f} at {:.0f} nm", lens.name,
-                                         lens.focalLength(at_nm(lower + width / 2)), lower + width / 2),
-                             [bin](const std::vector<Film>& films) { return meanOfBin(films[0], bin); },
-                             mean});
+            quantities.push_back({fmt::format("{} of SF10, f = {:.4f} at {:.0f} nm", lens.name,
+                                              lens.focalLength(at_nm(lower + width / 2)), lower + width / 2),
+                                  [bin](const std::vector<Film>& films) { return meanOfBin(films[0], bin); },
+                                  mean});
         }
         context.estimate(
-            asked,
+            quantities,
             {lensScene(lens.objects, "{glass: SF10}", at,
                        fmt::format(", spectral: {{from_nm: {}, to_nm: {}, bins: {}}}", kFrom, kTo, kBins))},
             0.01, {.samples = 256, .most = 16384});

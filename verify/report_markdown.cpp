@@ -82,8 +82,8 @@ std::string registryMarkdown(const std::vector<std::string>& suites) {
     for (const Case& c : registry()) {
         if (c.group() != group) {
             group = c.group();
-            text += fmt::format("\n## {}: {}\n\n| | asked | expected | source | tolerance | level |", group,
-                                groupTitle(group));
+            text += fmt::format("\n## {}: {}\n\n| | quantity | expected | source | tolerance | level |",
+                                group, groupTitle(group));
             for (const std::string& b : backends) text += fmt::format(" {} |", b);
             text += "\n|---|---|---|---|---|---|";
             for (std::size_t i = 0; i < backends.size(); ++i) text += "---|";

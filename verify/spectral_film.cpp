@@ -40,7 +40,7 @@ double integral(double from_nm, double to_nm, const Function& f) {
     return sum * step;
 }
 
-Asked asked(const std::string& what, std::uint32_t which, double expected) {
+Quantity binned(const std::string& what, std::uint32_t which, double expected) {
     return {what, [which](const std::vector<Film>& films) { return meanOfBin(films[0], which); },
             expected};
 }
@@ -58,14 +58,13 @@ void bins(Context& context) {
     const std::string film =
         fmt::format("spectral: {{from_nm: {}, to_nm: {}, bins: {}}}", kFrom, kTo, kBins);
     const Spectrum lamp = warm();
-    std::vector<Asked> flat, coloured;
+    std::vector<Quantity> flat, coloured;
     for (std::uint32_t bin = 0; bin < kBins; ++bin) {
         const double width = (kTo - kFrom) / kBins, lower = kFrom + bin * width;
-        flat.push_back(asked(fmt::format("radiance 1, {} to {} nm", lower, lower + width), bin, 1));
-        coloured.push_back(asked(fmt::format("2700 K, {} to {} nm", lower, lower + width), bin,
-                                 integral(lower, lower + width,
-                                          [&](double nm) { return onGrid(lamp, nm); }) /
-                                     width));
+        flat.push_back(binned(fmt::format("radiance 1, {} to {} nm", lower, lower + width), bin, 1));
+        coloured.push_back(
+            binned(fmt::format("2700 K, {} to {} nm", lower, lower + width), bin,
+                   integral(lower, lower + width, [&](double nm) { return onGrid(lamp, nm); }) / width));
     }
     const Effort effort{.samples = 256, .most = 16384};
     context.estimate(flat, {measured("1", film)}, 0.004, effort);
@@ -139,16 +138,16 @@ void responses(Context& context) {
     context.relative("a sensor that answers as the observer does, over Y", worst, 1, 1e-6);
 
     for (const bool normalise : {true, false}) {
-        std::vector<Asked> flat, coloured;
+        std::vector<Quantity> flat, coloured;
         for (const auto& [which, response] : {std::pair{1u, &blue}, std::pair{2u, &red}}) {
             const auto answer = [&, r = response](double nm) { return onGrid(*r, nm); };
             const double whole = integral(360, 830, answer), unit = normalise ? whole : 1;
             const char* const name = which == 1 ? "bell" : "edge";
             const char* const by = normalise ? "" : ", not normalised";
-            flat.push_back(asked(fmt::format("radiance 1, a {}{}", name, by), which, whole / unit));
-            coloured.push_back(asked(
-                fmt::format("2700 K, a {}{}", name, by), which,
-                integral(360, 830, [&](double nm) { return onGrid(lamp, nm) * answer(nm); }) / unit));
+            flat.push_back(binned(fmt::format("radiance 1, a {}{}", name, by), which, whole / unit));
+            coloured.push_back(
+                binned(fmt::format("2700 K, a {}{}", name, by), which,
+                       integral(360, 830, [&](double nm) { return onGrid(lamp, nm) * answer(nm); }) / unit));
         }
         const Effort effort{.samples = 256, .most = 16384};
         context.estimate(flat, {measured("1", film(normalise))}, 0.004, effort);

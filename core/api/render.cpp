@@ -95,14 +95,14 @@ struct Session::Impl {
 
     Rendered render(std::optional<EarlierFilm> earlier, const RenderOptions& options, Watch* watch);
     /// The scene as these options want it, on their devices.
-    SceneOnDevices& devicesFor(const crt::RenderOptions& options);
+    SceneRenderer& devicesFor(const crt::RenderOptions& options);
 
     v0::Scene scene;
     std::optional<crt::Scene> with_replicates;  ///< Of the scene, which leaves them out, for a target error.
-    std::optional<SceneOnDevices> devices;      ///< Last: of one of the scenes.
+    std::optional<SceneRenderer> devices;      ///< Last: of one of the scenes.
 };
 
-SceneOnDevices& Session::Impl::devicesFor(const crt::RenderOptions& options) {
+SceneRenderer& Session::Impl::devicesFor(const crt::RenderOptions& options) {
     const bool needs_replicates = options.target_error > 0 && replicatesOf(scene.impl().scene) <= 1;
     if (devices && needs_replicates == with_replicates.has_value() &&
         sameDevices(devices->options(), options))
@@ -122,7 +122,7 @@ Rendered Session::Impl::render(std::optional<EarlierFilm> earlier, const RenderO
         const Stopwatch total;
         refuseContradictions(options);
         const crt::RenderOptions inner = optionsOf(options);
-        SceneOnDevices& on_devices = devicesFor(inner);
+        SceneRenderer& on_devices = devicesFor(inner);
         const SamplingPlan plan =
             planSamples(inner, on_devices.scene(), earlier ? earlier->film.samples : SampleRanges());
         Relay relay(watch);

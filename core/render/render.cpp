@@ -141,18 +141,18 @@ SamplingPlan planSamples(const RenderOptions& options, const Scene& scene, const
     return plan;
 }
 
-SceneOnDevices::SceneOnDevices(const Scene& scene, const RenderOptions& options)
+SceneRenderer::SceneRenderer(const Scene& scene, const RenderOptions& options)
     : scene_(scene), options_(options) {}
 
-SceneOnDevices::~SceneOnDevices() = default;
+SceneRenderer::~SceneRenderer() = default;
 
-void SceneOnDevices::close() {
+void SceneRenderer::close() {
     devices_.reset();
     session_.reset();
 }
 
 /// Begins to open the devices, which takes as long as compiling a scene.
-void SceneOnDevices::open(RunFacts& facts) {
+void SceneRenderer::open(RunFacts& facts) {
     if (session_) return;
     compiled_.reset();  // Perhaps without an accelerator.
     const Stage stage("opening the backend");
@@ -164,7 +164,7 @@ void SceneOnDevices::open(RunFacts& facts) {
 
 /// The data that rendering needs: one flat blob, and the mask of its features. Nothing is built for a
 /// backend that brings it, nor where none will render.
-void SceneOnDevices::compile() {
+void SceneRenderer::compile() {
     if (compiled_) return;
     constexpr double kNobodyTraces = std::numeric_limits<double>::infinity();
     const std::uint32_t aovs = requestedAovs(scene_);
@@ -182,7 +182,7 @@ void SceneOnDevices::compile() {
 }
 
 /// The scene, with an empty film, onto devices that are open.
-void SceneOnDevices::prepare(RunFacts& facts) {
+void SceneRenderer::prepare(RunFacts& facts) {
     const std::string& backend = session_->backend().name;
     std::optional<Stage> stage(std::in_place, "preparing the scene for " + backend);
     const Stopwatch preparing;
@@ -199,7 +199,7 @@ void SceneOnDevices::prepare(RunFacts& facts) {
 }
 
 /// CompiledScene → Film, by a backend.
-void SceneOnDevices::renderSamples(const SamplingPlan& plan, Watch& watch, const CheckpointPlan& checkpoints,
+void SceneRenderer::renderSamples(const SamplingPlan& plan, Watch& watch, const CheckpointPlan& checkpoints,
                                    Rendered& run) {
     RunFacts& facts = run.facts;
     openDevices(*session_, facts);
@@ -237,7 +237,7 @@ void SceneOnDevices::renderSamples(const SamplingPlan& plan, Watch& watch, const
     run.failure = result.failure;
 }
 
-Rendered SceneOnDevices::render(const SamplingPlan& plan, std::optional<EarlierFilm> earlier, Watch& watch,
+Rendered SceneRenderer::render(const SamplingPlan& plan, std::optional<EarlierFilm> earlier, Watch& watch,
                                 const CheckpointPlan& checkpoints) {
     try {
         Rendered run = rendered(plan, std::move(earlier), watch, checkpoints);
@@ -249,7 +249,7 @@ Rendered SceneOnDevices::render(const SamplingPlan& plan, std::optional<EarlierF
     }
 }
 
-Rendered SceneOnDevices::rendered(const SamplingPlan& plan, std::optional<EarlierFilm> earlier, Watch& watch,
+Rendered SceneRenderer::rendered(const SamplingPlan& plan, std::optional<EarlierFilm> earlier, Watch& watch,
                                   const CheckpointPlan& checkpoints) {
     dateUtc();  // Refuses now a SOURCE_DATE_EPOCH that is none.
     RunFacts facts;
@@ -289,7 +289,7 @@ void judgeError(Rendered& run) {
 
 Rendered render(const Scene& scene, const RenderOptions& options, const SamplingPlan& plan,
                 std::optional<EarlierFilm> earlier, Watch& watch, const CheckpointPlan& checkpoints) {
-    return SceneOnDevices(scene, options).render(plan, std::move(earlier), watch, checkpoints);
+    return SceneRenderer(scene, options).render(plan, std::move(earlier), watch, checkpoints);
 }
 
 }  // namespace crt

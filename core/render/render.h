@@ -66,14 +66,14 @@ struct Rendered {
 };
 
 /// A scene, compiled, on open devices. Renders that follow each other pay for that once. [owner thread]
-class SceneOnDevices {
+class SceneRenderer {
 public:
     /// Nothing is opened yet. The scene must outlive this. Of `options` what says where and how it is
     /// rendered.
-    SceneOnDevices(const Scene& scene, const RenderOptions& options);
-    ~SceneOnDevices();
-    SceneOnDevices(const SceneOnDevices&) = delete;
-    SceneOnDevices& operator=(const SceneOnDevices&) = delete;
+    SceneRenderer(const Scene& scene, const RenderOptions& options);
+    ~SceneRenderer();
+    SceneRenderer(const SceneRenderer&) = delete;
+    SceneRenderer& operator=(const SceneRenderer&) = delete;
 
     const Scene& scene() const { return scene_; }
     const RenderOptions& options() const { return options_; }
@@ -106,7 +106,7 @@ private:
 /// Adds the film's error estimate to the facts of the run. It takes as long as adding a film.
 void judgeError(Rendered& run);
 
-/// SceneOnDevices::render(), once.
+/// SceneRenderer::render(), once.
 Rendered render(const Scene& scene, const RenderOptions& options, const SamplingPlan& plan,
                 std::optional<EarlierFilm> earlier, Watch& watch, const CheckpointPlan& checkpoints = {});
 

@@ -274,7 +274,7 @@ def test_expected_measured_and_tolerance_are_in_sight(verified):
     seen = " ".join("".join(page.visible).split())
     outcomes = [outcome for case in data["cases"] for outcome in case["outcomes"]]
     for outcome in outcomes:
-        row = next(row for row in page.rows if " ".join(row.get("asked", "").split()) == outcome["what"]
+        row = next(row for row in page.rows if " ".join(row.get("quantity", "").split()) == outcome["what"]
                    and row.get("verdict", "").strip() == outcome["verdict"])
         assert row["tolerance"].strip() == outcome["tolerance"]
         if outcome["expected"] is not None:
@@ -308,8 +308,8 @@ def test_what_failed_comes_first(verified, edited):
     assert page.text.startswith("crt verify: FAILED")
     assert page.text.index("one of the two cosines is missing") < page.text.index("Deviations from the "
                                                                                   "expected results")
-    asked = [row for row in page.rows if "asked" in row]
-    assert asked[0]["verdict"].strip() == "FAIL" and asked[1]["asked"].strip() == "first"
+    rows = [row for row in page.rows if "quantity" in row]
+    assert rows[0]["verdict"].strip() == "FAIL" and rows[1]["quantity"].strip() == "first"
     assert "1 FAIL" in page.text
 
 

@@ -58,7 +58,7 @@ public:
         claimFolder();
         makeReferences();
         if (const auto request = watch_.stopRequested()) return request->exit_code;
-        openContestants();
+        openBackends();
         render();
         return report();
     }
@@ -276,7 +276,7 @@ private:
         left_cold_ = true;
     }
 
-    void openContestants() {
+    void openBackends() {
         for (std::size_t s = 0; s < scenes_.size(); ++s)
             for (const std::string& backend : request_.backends)
                 for (const Variant& variant : variantsOf(request_.vary)) {

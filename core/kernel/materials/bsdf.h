@@ -166,10 +166,10 @@ CRT_FN void crt_bsdf_prepare(const CrtContext *ctx, CrtBsdf *b, const CrtSurface
 }
 
 /* Smooth dielectric, with or without a film. */
-CRT_FN CrtScatter crt_sample_smooth(const CrtBsdf *b, vec4 hero, int alone, f32 u) {
-    if (crt_has_film(b)) return crt_to_its_side(b, crt_sample_filmed_dielectric(b, hero, alone, u));
+CRT_FN CrtScatter crt_sample_smooth(const CrtBsdf *b, vec4 hero, int hero_only, f32 u) {
+    if (crt_has_film(b)) return crt_to_its_side(b, crt_sample_filmed_dielectric(b, hero, hero_only, u));
     return crt_to_its_side(b, crt_sample_dielectric(b->eta, b->wo, b->ns, hero,
-                                                    (b->flags & CRT_BSDF_DISPERSIVE) != 0u, alone, u));
+                                                    (b->flags & CRT_BSDF_DISPERSIVE) != 0u, hero_only, u));
 }
 
 /* True if crt_bsdf_sample needs its second pair of random numbers. */
@@ -178,9 +178,10 @@ CRT_FN int crt_chooses(const CrtBsdf *b) {
 }
 
 /* A direction w_i, distributed as the density of crt_bsdf or a delta. `choice`: two more random numbers,
-   where crt_chooses. `hero`: 1 in the hero's lane, 0 elsewhere. `alone`: only the hero is
+   where crt_chooses. `hero`: 1 in the hero's lane, 0 elsewhere. `hero_only`: only the hero is
    alive. */
-CRT_FN CrtScatter crt_bsdf_sample(const CrtBsdf *b, CrtRandom2 u, CrtRandom2 choice, vec4 hero, int alone) {
+CRT_FN CrtScatter crt_bsdf_sample(const CrtBsdf *b, CrtRandom2 u, CrtRandom2 choice, vec4 hero,
+                                  int hero_only) {
     (void)choice;
     switch (b->type) {
         case CRT_MATERIAL_DIFFUSE:
@@ -199,13 +200,13 @@ CRT_FN CrtScatter crt_bsdf_sample(const CrtBsdf *b, CrtRandom2 u, CrtRandom2 cho
             }
             break;
         case CRT_MATERIAL_DIELECTRIC:
-            if (CRT_HAS(DIELECTRIC)) return crt_sample_smooth(b, hero, alone, u.x);
+            if (CRT_HAS(DIELECTRIC)) return crt_sample_smooth(b, hero, hero_only, u.x);
             break;
         case CRT_MATERIAL_ROUGH_DIELECTRIC:
             if (CRT_HAS(ROUGH_DIELECTRIC)) {
                 if ((b->flags & CRT_BSDF_DELTA) == 0u)
                     return crt_to_its_side(b, crt_sample_rough_dielectric(b, u, choice));
-                return crt_sample_smooth(b, hero, alone, u.x);
+                return crt_sample_smooth(b, hero, hero_only, u.x);
             }
             break;
         case CRT_MATERIAL_THIN_DIELECTRIC:

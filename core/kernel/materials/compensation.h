@@ -162,8 +162,8 @@ CRT_FN CrtLosses crt_losses(const CrtContext *ctx, u32 loss, f32 roughness, vec4
 CRT_FN void crt_prepare_metal_loss(CrtBsdf *b, vec4 mean) {
     const f32 lost = crt_loss_lane(b, 0u, crt_loss_place(b, b->wo, dot3(b->wo, b->ns)), 0.0f);
     const f32 lost_mean = crt_loss_lane(b, 0u, crt_loss_constant(b, CRT_LOSS_MEAN), 0.0f);
-    const f32 again = CRT_LOST_AGAIN * lost_mean;
-    b->reflectance = mean * mean * ((1.0f - again) * lost / lost_mean) / (splat4(1.0f) - mean * again);
+    const f32 relost = CRT_LOST_AGAIN * lost_mean;
+    b->reflectance = mean * mean * ((1.0f - relost) * lost / lost_mean) / (splat4(1.0f) - mean * relost);
     b->lost_chance = lost;
 }
 

@@ -78,7 +78,7 @@ CRT_FN CrtScatter crt_single_below(const CrtBsdf *b, CrtScatter s, f32 chance) {
 /* One of the layers or what lies below them by chance, for which u.x is used again; but for single
    directions, weighed by the density of all. */
 CRT_FN CrtScatter crt_layered_sample(const CrtBsdf *b, CrtRandom2 u, CrtRandom2 choice, vec4 hero,
-                                     int alone) {
+                                     int hero_only) {
     int layer = CRT_LAYER_NONE;
     f32 chance = 1.0f;
     if (crt_is_fuzzy(b)) {
@@ -108,7 +108,7 @@ CRT_FN CrtScatter crt_layered_sample(const CrtBsdf *b, CrtRandom2 u, CrtRandom2 
         if (!(dot3(s.wi, b->ng) > 0.0f)) return crt_sample_layer_alone(b, layer, s, chance);
         below = crt_bsdf(b, s.wi, &pdf);
     } else {
-        s = crt_bsdf_sample(b, u, choice, hero, alone);
+        s = crt_bsdf_sample(b, u, choice, hero, hero_only);
         if (!s.valid || (!crt_is_fuzzy(b) && !crt_is_coated(b))) return s;
         if (s.pdf == 0.0f) return crt_single_below(b, s, chance);
         below = s.weight * s.pdf;

@@ -130,8 +130,8 @@ CRT_FN f32 crt_surface_pdf(const CrtBsdf *b, vec3 wi) {
 
 /* The weight is of the way that was taken; the density, which light sampling competes with, of both. */
 CRT_FN CrtScatter crt_surface_sample(const CrtBsdf *b, CrtRandom2 u, CrtRandom2 choice, vec4 hero,
-                                     int alone) {
-    CrtScatter s = crt_layered_sample(b, u, choice, hero, alone);
+                                     int hero_only) {
+    CrtScatter s = crt_layered_sample(b, u, choice, hero, hero_only);
     if (!crt_is_facet(b) || !s.valid) return s;
     if (dot3(s.wi, b->base) < 0.0f) s.wi = crt_mirrored(s.wi, b->base);
     if (CRT_HAS(SMOOTH_NORMALS) && dot3(s.wi, b->side) < 0.0f && crt_is_tilted(b)) {

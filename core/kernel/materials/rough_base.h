@@ -46,7 +46,7 @@ CRT_FN vec4 crt_prepare_rough_base(const CrtContext *ctx, CrtBsdf *b, u32 materi
     b->base_roughness = layers.base_roughness;
     const f32 mean = layers.base_mean, facing = crt_base_loss(b, 1.0f);
     const vec4 rounds = reflectance * (1.0f - mean) / (splat4(1.0f) - reflectance * mean);
-    b->again = b->reflectance * rounds * (crt_base_loss(b, dot3(b->wo, b->ns)) / mean);
+    b->multiple = b->reflectance * rounds * (crt_base_loss(b, dot3(b->wo, b->ns)) / mean);
     b->reflectance = b->reflectance * (passed * layers.base_scale);
     return reflectance * (splat4(1.0f - facing) + rounds * facing);
 }
@@ -56,7 +56,7 @@ CRT_FN vec4 crt_rough_base(const CrtBsdf *b, vec3 w, f32 cos_i) {
     const f32 cos_o = dot3(b->wo, b->ns);
     const f32 s = dot3(w, b->wo) - cos_i * cos_o;
     const f32 once = crt_fma(b->base_roughness, s > 0.0f ? s / crt_max(cos_i, cos_o) : s, 1.0f);
-    return b->reflectance * crt_max(once, 0.0f) + b->again * crt_base_loss(b, cos_i);
+    return b->reflectance * crt_max(once, 0.0f) + b->multiple * crt_base_loss(b, cos_i);
 }
 
 CRT_KERNEL_END

@@ -74,7 +74,7 @@ typedef struct CrtBsdf {
     f32 clear_chance; /* of sampling it */
     vec4 clear_below; /* what is left of what lies below, but for the way in */
     vec4 clear_depth; /* of which exp(−depth) is left straight on */
-    vec4 again;       /* of what is reflected more than once, to be multiplied with the loss towards w_i */
+    vec4 multiple;    /* of what is reflected more than once, to be multiplied with the loss towards w_i */
     vec4 albedo;      /* for the first-hit output; only where it is asked for */
     int facet;        /* it is of a mapped surface (normal_map.h); then: */
     vec3 base;        /* unit, the surface's own shading normal, on the side of w_o */
@@ -169,9 +169,9 @@ CRT_FN CrtScatter crt_sample_mirror(vec4 reflectance, vec3 wo, vec3 ns, vec3 ng)
 }
 
 /* An interface mirrors the share `fresnel` of each wavelength, with the chance `reflect`, and refracts the
-   rest by `eta`. `alone`: the refraction is right for the hero only. Sides are those of ns. */
+   rest by `eta`. `hero_only`: the refraction is right for the hero only. Sides are those of ns. */
 CRT_FN CrtScatter crt_reflect_or_refract(vec3 wo, vec3 ns, f32 cos_i, f32 eta, vec4 fresnel, vec4 passed,
-                                         f32 reflect, int alone, f32 u) {
+                                         f32 reflect, int hero_only, f32 u) {
     CrtScatter s;
     s.pdf = 0.0f;
     s.eta_square = 1.0f;
@@ -184,7 +184,7 @@ CRT_FN CrtScatter crt_reflect_or_refract(vec3 wo, vec3 ns, f32 cos_i, f32 eta, v
     }
     const f32 inverse_eta = 1.0f / eta;
     const f32 refraction = crt_refraction(cos_i, eta);
-    s.hero_only = alone;
+    s.hero_only = hero_only;
     s.eta_square = eta * eta;
     s.weight = passed / (1.0f - reflect) * (inverse_eta * inverse_eta);
     /* An index of exactly 1 is no surface: the direction passes unrounded. */
@@ -196,14 +196,14 @@ CRT_FN CrtScatter crt_reflect_or_refract(vec3 wo, vec3 ns, f32 cos_i, f32 eta, v
 }
 
 /* Smooth dielectric. `eta`: index beyond the surface / index on w_o's side. `hero`: 1 in the hero's lane, 0
-   elsewhere. `dispersive`: the index differs between the path's living wavelengths. `alone`: only the hero
-   is alive. */
-CRT_FN CrtScatter crt_sample_dielectric(vec4 eta, vec3 wo, vec3 ns, vec4 hero, int dispersive, int alone,
+   elsewhere. `dispersive`: the index differs between the path's living wavelengths. `hero_only`: only the
+   hero is alive. */
+CRT_FN CrtScatter crt_sample_dielectric(vec4 eta, vec3 wo, vec3 ns, vec4 hero, int dispersive, int hero_only,
                                         f32 u) {
     const f32 cos_i = crt_min(dot3(wo, ns), 1.0f);
     const f32 eta_hero = CRT_HAS(DISPERSION) ? sum4(eta * hero) : V4X(eta);
     const f32 fresnel_hero = crt_fresnel_dielectric(cos_i, eta_hero);
-    const int divided = CRT_HAS(DISPERSION) && dispersive && !alone;
+    const int divided = CRT_HAS(DISPERSION) && dispersive && !hero_only;
     vec4 fresnel = splat4(fresnel_hero);
     f32 reflect = fresnel_hero;
     if (divided) {

@@ -145,13 +145,13 @@ CRT_FN int crt_is_divided(const CrtBsdf *b) {
 }
 
 /* Smooth dielectric under a film. */
-CRT_FN CrtScatter crt_sample_filmed_dielectric(const CrtBsdf *b, vec4 hero, int alone, f32 u) {
+CRT_FN CrtScatter crt_sample_filmed_dielectric(const CrtBsdf *b, vec4 hero, int hero_only, f32 u) {
     const f32 cos_i = crt_min(dot3(b->wo, b->ns), 1.0f);
     const vec4 fresnel = crt_film_reflectance(b, cos_i);
     return crt_reflect_or_refract(b->wo, b->ns, cos_i,
                                   CRT_HAS(DISPERSION) ? sum4(b->eta * hero) : V4X(b->eta), fresnel,
                                   splat4(1.0f) - fresnel, sum4(b->lanes * fresnel),
-                                  (b->flags & CRT_BSDF_DISPERSIVE) != 0u && !alone, u);
+                                  (b->flags & CRT_BSDF_DISPERSIVE) != 0u && !hero_only, u);
 }
 
 CRT_KERNEL_END

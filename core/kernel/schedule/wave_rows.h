@@ -18,7 +18,7 @@ CRT_KERNEL_BEGIN
 /* State of a slot. None: its path goes on from a vertex. */
 #define CRT_WAVE_DONE 1u  /* its samples are taken, or it has none */
 #define CRT_WAVE_ENDED 2u /* its path has ended */
-#define CRT_WAVE_ASKED 4u /* a shadow ray waits for its answer */
+#define CRT_WAVE_SHADOW 4u /* it waits for a shadow ray */
 #define CRT_WAVE_PASSED 8u /* the ray that it waits for goes on behind a surface that it has passed */
 #define CRT_WAVE_LAST 16u /* behind the surface that its shadow ray meets there is no other */
 
@@ -254,16 +254,16 @@ CRT_FN void crt_store_panes(const CrtWave *wave, u32 slot, u32 panes) {
 
 /* The depth of the vertex that sent a shadow ray: crt_shade has counted that vertex already where the path
    goes on. */
-CRT_FN u32 crt_asking_depth(const CrtWave *wave, u32 slot, u32 state) {
+CRT_FN u32 crt_shadow_depth(const CrtWave *wave, u32 slot, u32 state) {
     return crt_load_depth(wave, slot) - (state & CRT_WAVE_ENDED ? 0u : 1u);
 }
 
 /* The state of a slot's ray while it passes surfaces. `state`: of the slot. */
 CRT_FN CrtPassage crt_load_passage(const CrtContext *ctx, const CrtWave *wave, u32 slot, u32 state) {
-    const int shadow = (state & CRT_WAVE_ASKED) != 0u;
+    const int shadow = (state & CRT_WAVE_SHADOW) != 0u;
     const vec4 direction =
         *crt_row(wave, shadow ? CRT_ROW_SHADOW_DIRECTION : CRT_ROW_DIRECTION, slot);
-    const u32 depth = shadow ? crt_asking_depth(wave, slot, state) : crt_load_depth(wave, slot);
+    const u32 depth = shadow ? crt_shadow_depth(wave, slot, state) : crt_load_depth(wave, slot);
     const u32 media =
         crt_bits(V4W(shadow ? direction : *crt_row(wave, CRT_ROW_REST, slot)));
     const vec4 carried = *crt_row(wave, shadow ? CRT_ROW_SHADOW_RADIANCE : CRT_ROW_THROUGHPUT, slot);

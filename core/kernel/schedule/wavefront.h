@@ -139,7 +139,7 @@ CRT_FN u32 crt_wave_trace(const CrtContext *ctx, const CrtWave *wave, u32 slot, 
                           CrtRayCount *rays, u32 *finished) {
     u32 state = first_pass ? CRT_WAVE_ENDED : wave->state[slot];
     if ((state & CRT_WAVE_DONE) != 0u) return CRT_NONE;
-    if ((state & CRT_WAVE_ASKED) != 0u) {
+    if ((state & CRT_WAVE_SHADOW) != 0u) {
         if (!crt_wave_resolve_shadow(ctx, wave, slot, state, rays)) return wave->queue_of_choice;
         state &= CRT_WAVE_ENDED;
     }
@@ -160,7 +160,7 @@ CRT_FN u32 crt_wave_trace(const CrtContext *ctx, const CrtWave *wave, u32 slot, 
    that surface. A shadow ray is finished if it is stopped or has passed the last surface. */
 CRT_FN int crt_wave_passes(const CrtContext *ctx, const CrtWave *wave, u32 slot) {
     const u32 state = wave->state[slot];
-    const int shadow = (state & CRT_WAVE_ASKED) != 0u;
+    const int shadow = (state & CRT_WAVE_SHADOW) != 0u;
     CrtSampler sampler = crt_load_sampler(ctx, wave, slot);
     CrtPassage way = crt_load_passage(ctx, wave, slot, state);
     CrtRay ray = shadow ? crt_load_shadow_ray(wave, slot) : crt_load_path_ray(wave, slot);
@@ -219,7 +219,7 @@ CRT_FN void crt_wave_shade(const CrtContext *ctx, const CrtWave *wave, u32 slot)
     if (alive) crt_store_vertex(ctx, wave, slot, &path);
     if (first) crt_store_first_hit(wave, slot, &path);
     if (CRT_HAS(NEE) && shadow.pending) {
-        state |= CRT_WAVE_ASKED;
+        state |= CRT_WAVE_SHADOW;
         *crt_row(wave, CRT_ROW_SHADOW_ORIGIN, slot) = crt_row_of(shadow.ray.o, shadow.ray.reach);
         *crt_row(wave, CRT_ROW_SHADOW_DIRECTION, slot) =
             crt_row_of(shadow.ray.d, crt_from_bits(CRT_HAS(MEDIA) ? shadow.media : 0u));

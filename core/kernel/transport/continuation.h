@@ -15,13 +15,14 @@ CRT_FN int crt_continue(const CrtContext *ctx, CrtPath *path, const CrtVertex *v
     const CrtRandom2 u = crt_sample_2d(&path->sampler, dimension + CRT_DIM_BSDF);
     CrtRandom2 choice = u;
     if (crt_vertex_chooses(vertex)) choice = crt_sample_2d(&path->sampler, dimension + CRT_DIM_CHOICE);
-    const CrtScatter scatter = crt_vertex_sample(vertex, u, choice, path->hero, path->alone, CRT_RADIANCE);
+    const CrtScatter scatter =
+        crt_vertex_sample(vertex, u, choice, path->hero, path->hero_only, CRT_RADIANCE);
     if (!scatter.valid) return 0;
 
     path->throughput = path->throughput * scatter.weight;
     if (CRT_HAS(DISPERSION) && scatter.hero_only) {
         path->throughput = path->throughput * path->hero * 4.0f;
-        path->alone = 1;
+        path->hero_only = 1;
     }
     path->eta_square = path->eta_square * scatter.eta_square;
     path->scatter_pdf = scatter.pdf;

@@ -27,7 +27,7 @@ CRT_KERNEL_BEGIN
  *   depth           scattering events so far
  *   panes           that the path has passed, up to CRT_PANES_COUNTED
  *   hero            1 in the lane of the hero wavelength, 0 elsewhere
- *   alone           only the hero wavelength is alive
+ *   hero_only       only the hero wavelength is alive
  *   p               where the path was scattered: a clearance off the ray's origin
  *   scatter_pdf     of the direction that led here; 0: camera or delta, no light sampling competes
  *   scatter_cosine  crt_scatter_cosine of that direction, where scatter_pdf is above 0
@@ -37,7 +37,7 @@ CRT_KERNEL_BEGIN
  *   side            crt_scattering_side (vertex.h) of the vertex at p
  */
 #define CRT_PATH_STATE(VERTEX, TREE, BEGIN, FIRST)                                              \
-    VERTEX(ORIGIN, CrtRay ray; u32 depth; u32 panes; vec4 hero; int alone;, V3(ray.o, WORD))    \
+    VERTEX(ORIGIN, CrtRay ray; u32 depth; u32 panes; vec4 hero; int hero_only;, V3(ray.o, WORD))    \
     VERTEX(DIRECTION, CrtSampler sampler;, V3(ray.d, NUMBERS))                                  \
     VERTEX(THROUGHPUT, vec4 throughput;, V4(throughput))                                        \
     BEGIN(RADIANCE, vec4 radiance;, V4(radiance))                                               \
@@ -67,9 +67,9 @@ CRT_FN u32 crt_count_panes(u32 before, u32 more) {
     return before + more < CRT_PANES_COUNTED ? before + more : CRT_PANES_COUNTED;
 }
 
-/* Depth, panes, hero wavelength and `alone` in one word. */
+/* Depth, panes, hero wavelength and `hero_only` in one word. */
 CRT_FN u32 crt_path_word(const CrtPath *path) {
-    u32 word = path->depth | path->panes << 26 | (path->alone ? 0x80000000u : 0u);
+    u32 word = path->depth | path->panes << 26 | (path->hero_only ? 0x80000000u : 0u);
     if (CRT_HAS(DISPERSION))
         word |= (u32)(V4Y(path->hero) + 2.0f * V4Z(path->hero) + 3.0f * V4W(path->hero)) << 29;
     return word;
@@ -80,7 +80,7 @@ CRT_FN void crt_set_path_word(CrtPath *path, u32 word) {
     path->depth = crt_depth_of_word(word);
     path->panes = crt_panes_of_word(word);
     path->hero = crt_hero_lane(CRT_HAS(DISPERSION) ? word >> 29 & 3u : 0u);
-    path->alone = word >> 31 != 0u;
+    path->hero_only = word >> 31 != 0u;
 }
 
 CRT_KERNEL_END

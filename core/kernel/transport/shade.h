@@ -34,7 +34,7 @@ CRT_FN void crt_path_begin(const CrtContext *ctx, CrtPath *path, u32 x, u32 y, u
     path->eta_square = 1.0f;
     path->depth = 0u;
     path->panes = 0u;
-    path->alone = 0;
+    path->hero_only = 0;
     path->met = CRT_NONE;
     path->media = CRT_HAS(MEDIA) ? scene->camera_media : 0u;
     path->first.albedo = splat4(0.0f);

@@ -121,10 +121,10 @@ CRT_FN vec4 crt_vertex_eval(const CrtVertex *vertex, vec3 wi, int mode) {
 CRT_FN f32 crt_vertex_pdf(const CrtVertex *vertex, vec3 wi) { return crt_surface_pdf(&vertex->bsdf, wi); }
 
 /* A direction in which the path goes on. `choice`: two more random numbers, where crt_vertex_chooses.
-   `hero`: 1 in the hero's lane, 0 elsewhere. `alone`: only the hero is alive. */
+   `hero`: 1 in the hero's lane, 0 elsewhere. `hero_only`: only the hero is alive. */
 CRT_FN CrtScatter crt_vertex_sample(const CrtVertex *vertex, CrtRandom2 u, CrtRandom2 choice, vec4 hero,
-                                    int alone, int mode) {
-    CrtScatter s = crt_surface_sample(&vertex->bsdf, u, choice, hero, alone);
+                                    int hero_only, int mode) {
+    CrtScatter s = crt_surface_sample(&vertex->bsdf, u, choice, hero, hero_only);
     if (mode == CRT_RADIANCE || !s.valid) return s;
     s.weight = s.weight * crt_adjoint(vertex, s.wi);
     s.eta_square = 1.0f;
