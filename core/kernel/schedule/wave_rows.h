@@ -247,9 +247,8 @@ CRT_FN CrtRay crt_load_shadow_ray(const CrtWave *wave, u32 slot) {
 /* Counts panes that the slot's path has passed. */
 CRT_FN void crt_store_panes(const CrtWave *wave, u32 slot, u32 panes) {
     CRT_GLOBAL vec4 *row = crt_row(wave, CRT_ROW_ORIGIN, slot);
-    const u32 word = crt_bits(V4W(*row)), before = crt_panes_of_word(word);
-    const u32 counted = word + ((crt_count_panes(before, panes) - before) << 26);
-    *row = crt_row_of(crt_row_vector(*row), crt_from_bits(counted));
+    const u32 word = crt_word_behind_panes(crt_bits(V4W(*row)), panes);
+    *row = crt_row_of(crt_row_vector(*row), crt_from_bits(word));
 }
 
 /* The depth of the vertex that sent a shadow ray: crt_shade has counted that vertex already where the path

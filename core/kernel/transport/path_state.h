@@ -62,6 +62,7 @@ CRT_FN vec4 crt_hero_lane(u32 lane) {
 }
 
 #define CRT_PANES_COUNTED 7u
+#define CRT_PANES_SHIFT 26u /* in the word: above CRT_MOST_EVENTS */
 
 CRT_FN u32 crt_count_panes(u32 before, u32 more) {
     return before + more < CRT_PANES_COUNTED ? before + more : CRT_PANES_COUNTED;
@@ -69,13 +70,17 @@ CRT_FN u32 crt_count_panes(u32 before, u32 more) {
 
 /* Depth, panes, hero wavelength and `hero_only` in one word. */
 CRT_FN u32 crt_path_word(const CrtPath *path) {
-    u32 word = path->depth | path->panes << 26 | (path->hero_only ? 0x80000000u : 0u);
+    u32 word = path->depth | path->panes << CRT_PANES_SHIFT | (path->hero_only ? 0x80000000u : 0u);
     if (CRT_HAS(DISPERSION))
         word |= (u32)(V4Y(path->hero) + 2.0f * V4Z(path->hero) + 3.0f * V4W(path->hero)) << 29;
     return word;
 }
 CRT_FN u32 crt_depth_of_word(u32 word) { return word & CRT_MOST_EVENTS; }
-CRT_FN u32 crt_panes_of_word(u32 word) { return word >> 26 & CRT_PANES_COUNTED; }
+CRT_FN u32 crt_panes_of_word(u32 word) { return word >> CRT_PANES_SHIFT & CRT_PANES_COUNTED; }
+CRT_FN u32 crt_word_behind_panes(u32 word, u32 panes) {
+    const u32 before = crt_panes_of_word(word);
+    return word + ((crt_count_panes(before, panes) - before) << CRT_PANES_SHIFT);
+}
 CRT_FN void crt_set_path_word(CrtPath *path, u32 word) {
     path->depth = crt_depth_of_word(word);
     path->panes = crt_panes_of_word(word);
