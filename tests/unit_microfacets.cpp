@@ -9,6 +9,7 @@
 #include <cmath>
 
 using namespace kernel_test;
+using Catch::Matchers::WithinAbs;
 
 namespace {
 
@@ -117,4 +118,61 @@ TEST_CASE("microfacets: light that was lost once is lost again as often as the k
         INFO("roughness " << roughness << ": lost " << lost << ", again " << lost_again);
         CHECK(lost_again / lost == Approx(static_cast<double>(CRT_LOST_AGAIN)).margin(0.07));
     }
+}
+
+TEST_CASE("microfacets: the mean reflectance under a film agrees with quadrature",
+          "[kernel][bsdf][materials]") {
+    const auto [thickness_nm, film] =
+        GENERATE(table<double, double>({{20, 2.4}, {170, 2.4}, {550, 1.33}, {3000, 1.5}}));
+    crt::Material metal;
+    metal.type = crt::MaterialType::RoughConductor;
+    metal.roughness = 0.3;
+    metal.eta = crt::constantSpectrum(2.7);
+    metal.k = crt::constantSpectrum(3.6);
+    metal.film_thickness_nm = thickness_nm;
+    metal.film_index = crt::constantSpectrum(film);
+    const auto meanOf = [](const crt::Material& m) {
+        return crt::compensationsOf({&m}).mean_reflectance.at(&m);
+    };
+    const crt::Spectrum mean = meanOf(metal);
+    for (const std::size_t i : {std::size_t{0}, std::size_t{90}, std::size_t{470}}) {
+        constexpr int kSteps = 4000;
+        double expected = 0;
+        for (int step = 0; step < kSteps; ++step) {
+            const double c = (step + 0.5) / kSteps;
+            expected += 2 * c / kSteps *
+                        crt::verify::filmReflectance(c, film, thickness_nm, 360 + static_cast<double>(i),
+                                                     {2.7, 3.6});
+        }
+        // The kernel's equations have digits of 2^-24, Simpson's rule four cells for each fringe.
+        CHECK_THAT(mean[i], WithinAbs(expected, 2e-5));
+    }
+
+    // A texture makes the film thinner, or leaves it out.
+    metal.film_texture = 0;
+    crt::Material bare = metal;
+    bare.film_thickness_nm = 0;
+    CHECK(meanOf(metal) == meanOf(bare));
+}
+
+TEST_CASE("microfacets: where a texture leaves out a film the metal is bare", "[kernel][bsdf][materials]") {
+    CrtContext ctx{};
+    CrtMaterial material{};
+    material.reflectance = crt_bits(0.25f);
+    CrtBsdf b{};
+    b.eta = splat4(2.7f);
+    b.k = splat4(3.6f);
+    b.film_eta = splat4(2.4f);
+    b.film_rounds = splat4(0.8f);
+    const auto mean = [&] { return V4X(crt_metal_mean(&ctx, &b, &material, nullptr, splat4(0.0f))); };
+
+    constexpr u32 kTexture = CRT_VALUE_REFERENCE;
+    material.film_thickness = kTexture;
+    CHECK(mean() == 0.25f);
+    b.flags = CRT_BSDF_FILM;
+    CHECK(mean() == V4X(crt_film_mean(&b)));
+    CHECK(mean() != 0.25f);
+    // Without a texture the table's mean is that under the film.
+    material.film_thickness = crt_bits(1.0f);
+    CHECK(mean() == 0.25f);
 }

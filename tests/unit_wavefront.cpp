@@ -214,13 +214,8 @@ private:
     std::shared_ptr<void> take(std::uint64_t bytes) override { return {std::malloc(bytes), std::free}; }
 };
 
-}  // namespace
-
-TEST_CASE("in a pass, shaders run at the same time, and all else alone", "[wavefront]") {
-    crt::Scene scene =
-        sceneOf({crt::MaterialType::Diffuse, crt::MaterialType::Mirror, crt::MaterialType::Mix});
-    scene.materials[2].parts = {0, 1};
-    const CompiledScene c = compiled(scene);
+/// The launches of a wave of three samples of 16 × 16 pixels.
+std::vector<NotingDevice::Noted> launchesOf(const CompiledScene& c) {
     NotingDevice device;
     crt::gpu::Wavefront wavefront(device, c.data());
     std::vector<crt::gpu::GpuKernel> kernels;
@@ -231,17 +226,42 @@ TEST_CASE("in a pass, shaders run at the same time, and all else alone", "[wavef
     const crt::gpu::GpuBuffer none;
     const crt::gpu::GpuFilm film;
     wavefront.launch(kernels, launch, 1, {c.header(), none, film, none}, [] {});
-
-    constexpr std::size_t kOfAPass = 4;  // trace, choose, and one shader for each material
-    REQUIRE(device.launches.size() == (launch.sample_count + 1) * kOfAPass);
-    for (std::size_t i = 0; i < device.launches.size(); i += kOfAPass) {
+    // Trace, choose, and one shader for each of two materials; one pass more than samples.
+    REQUIRE(device.launches.size() == 4 * 4);
+    for (std::size_t i = 0; i < device.launches.size(); i += 4) {
         const NotingDevice::Noted* pass = &device.launches[i];
         CHECK(pass[0].name == "crt_trace");
         CHECK(pass[0].lane == 0);
         CHECK(pass[1].name == "crt_choose_queue");
-        CHECK(pass[1].lane == 0);
         CHECK(pass[2].name == "crt_shade_queue");
         CHECK(pass[3].name == "crt_shade_queue");
         CHECK(std::set<std::uint32_t>{0, pass[2].lane, pass[3].lane}.size() == 3);
     }
+    return device.launches;
+}
+
+}  // namespace
+
+TEST_CASE("in a pass, shaders run at the same time, and all else alone", "[wavefront]") {
+    crt::Scene scene =
+        sceneOf({crt::MaterialType::Diffuse, crt::MaterialType::Mirror, crt::MaterialType::Mix});
+    scene.materials[2].parts = {0, 1};
+    const std::vector<NotingDevice::Noted> launches = launchesOf(compiled(scene));
+    for (std::size_t i = 1; i < launches.size(); i += 4) CHECK(launches[i].lane == 0);
+}
+
+TEST_CASE("panes are chosen beside the shaders of other materials", "[wavefront]") {
+    crt::Scene scene = sceneOf({crt::MaterialType::Diffuse, crt::MaterialType::ThinDielectric});
+    scene.materials[1].eta = crt::constantSpectrum(1.5);
+    const CompiledScene c = compiled(scene);
+    const std::uint32_t panes = planWave(c.data()).queue_of_kind[CRT_MATERIAL_THIN_DIELECTRIC];
+    std::vector<NotingDevice::Noted> launches = launchesOf(c);
+    // In the lane of the panes' shader, and before it.
+    for (std::size_t i = 1; i < launches.size(); i += 4)
+        CHECK(launches[i].lane == launches[i + 1 + panes].lane);
+
+    // A hole may show any material.
+    scene.materials[1].opacity = 0.5;
+    launches = launchesOf(compiled(scene));
+    for (std::size_t i = 1; i < launches.size(); i += 4) CHECK(launches[i].lane == 0);
 }

@@ -72,12 +72,40 @@ Across acrossWavelengths(const Material& material) {
     return across;
 }
 
+/// The film is as thick everywhere.
+bool hasEvenFilm(const Material& material) {
+    return hasThinFilm(material) && material.film_texture == kNoTexture;
+}
+
+double reflectanceUnderFilm(const Material& metal, std::size_t i, double cosine) {
+    const double rounds = 2 * metal.film_thickness_nm / (kWavelengthMin_nm + static_cast<double>(i));
+    return kernel::crt_film_reflectance_lane(
+        static_cast<float>(cosine), static_cast<float>(metal.film_index[i]), static_cast<float>(rounds),
+        static_cast<float>(metal.eta[i]), static_cast<float>(metal.k[i]));
+}
+
+/// Cells for each fringe that the film may have between straight on and grazing.
+constexpr double kCellsOfFringe = 4;
+
+std::size_t cellsOf(const Material& metal) {
+    if (!hasEvenFilm(metal)) return 64;
+    const double fringes = 2 * metal.film_thickness_nm * metal.film_index.max() / kWavelengthMin_nm;
+    return static_cast<std::size_t>(std::clamp(std::ceil(kCellsOfFringe * fringes), 16.0, 64.0));
+}
+
+bool isGrey(const Material& metal) {
+    return metal.eta.isConstant() && metal.k.isConstant() && !hasEvenFilm(metal);
+}
+
 Spectrum meanReflectance(const Material& metal) {
     Spectrum mean;
     const auto at = [&](std::size_t i) {
-        return cosineMean(64, [&](double c) { return conductorReflectance(c, metal.eta[i], metal.k[i]); });
+        return cosineMean(cellsOf(metal), [&](double c) {
+            return hasEvenFilm(metal) ? reflectanceUnderFilm(metal, i, c)
+                                      : conductorReflectance(c, metal.eta[i], metal.k[i]);
+        });
     };
-    if (metal.eta.isConstant() && metal.k.isConstant()) return constantSpectrum(at(0));
+    if (isGrey(metal)) return constantSpectrum(at(0));
     for (std::size_t i = 0; i < kSpectrumSize; ++i) mean[i] = at(i);
     return mean;
 }
@@ -103,7 +131,7 @@ Anisotropy anisotropyOf(const Material& material) {
 namespace {
 
 bool hasMeanReflectance(const Material& material) {
-    return material.type == MaterialType::RoughConductor && !hasThinFilm(material) && !material.by_color;
+    return material.type == MaterialType::RoughConductor && !material.by_color;
 }
 
 bool hasTable(const Material& material) {
@@ -130,9 +158,12 @@ FilmKey filmKeyOf(const Material& material) {
             material.eta.values};
 }
 
-using MetalKey = std::pair<SpectrumValues, SpectrumValues>;
+using MetalKey = std::tuple<SpectrumValues, SpectrumValues, double, SpectrumValues>;
 
-MetalKey metalKeyOf(const Material& material) { return {material.eta.values, material.k.values}; }
+MetalKey metalKeyOf(const Material& material) {
+    if (!hasEvenFilm(material)) return {material.eta.values, material.k.values, 0, {}};
+    return {material.eta.values, material.k.values, material.film_thickness_nm, material.film_index.values};
+}
 
 /// Each is worked out once for materials with equal keys.
 std::map<const Material*, Spectrum> meanReflectances(const std::vector<const Material*>& materials) {
@@ -155,15 +186,15 @@ std::map<const Material*, Spectrum> meanReflectances(const std::vector<const Mat
 }  // namespace
 
 void countCompensations(const std::vector<const Material*>& materials, TableWork& work) {
-    constexpr double kStepsOfMetal = 2 * 3 * 64;
+    constexpr double kStepsOfCell = 2 * 3;
     std::set<LossKey> tables;
     std::set<FilmKey> films;
     std::set<MetalKey> metals;
     for (const Material* material : materials) {
         if (!material) continue;
         if (hasMeanReflectance(*material) && metals.insert(metalKeyOf(*material)).second) {
-            const bool grey = material->eta.isConstant() && material->k.isConstant();
-            work.add(kStepsOfMetal * (grey ? 1 : kSpectrumSize), *material);
+            const double cells = static_cast<double>(cellsOf(*material));
+            work.add(kStepsOfCell * cells * (isGrey(*material) ? 1 : kSpectrumSize), *material);
         }
         if (!hasTable(*material)) continue;
         const LossKey key = tableKeyOf(*material);

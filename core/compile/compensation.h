@@ -29,7 +29,8 @@ Anisotropy anisotropyOf(const Material& material);
 struct Compensations {
     std::vector<LossTable> tables;
     std::map<const Material*, std::uint32_t> table_of;
-    /// Of rough conductors: Fresnel's reflectance, its mean over the cosine.
+    /// Of rough conductors: the reflectance of their facets, its mean over the cosine. Under a film, unless
+    /// that is textured.
     std::map<const Material*, Spectrum> mean_reflectance;
 };
 

@@ -72,7 +72,7 @@ kernel::CrtMaterial recordOf(const Material& material, const MaterialTables& tab
         case MaterialType::Conductor:
             record.eta = spectra.valueOf(material.eta);
             record.k = spectra.valueOf(material.k);
-            if (material.type == MaterialType::RoughConductor && !hasThinFilm(material))
+            if (material.type == MaterialType::RoughConductor)
                 record.reflectance = spectra.valueOf(tables.compensations.mean_reflectance.at(&material));
             break;
         case MaterialType::RoughDielectric: record.roughness = roughness(); [[fallthrough]];

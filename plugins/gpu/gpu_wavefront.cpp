@@ -104,13 +104,17 @@ void Wavefront::runPass(const std::vector<GpuKernel>& kernels, const kernel::Crt
                        {std::min(blocks, most), CRT_WAVE_BLOCK, 1, lane}, arguments);
     };
     start(kernels.front(), blocks, 0);
+    // A slot is in one queue, so that the shaders of all queues may run at the same time. Those whose queues
+    // crt_choose_queue fills run behind it: where that is one, in its lane.
+    const auto laneOf = [](std::uint32_t queue) { return queue + 1; };
     // Only the device has the length of a queue: as many blocks as it holds at once take turns.
-    if (plan_.queue_of_choice != CRT_NONE) start(kernels.back(), kernels.back().resident_blocks, 0);
-    // A slot is in one queue, so that the shaders of all queues may run at the same time.
+    if (plan_.queue_of_choice != CRT_NONE)
+        start(kernels.back(), kernels.back().resident_blocks,
+              plan_.chosen_queue != CRT_NONE ? laneOf(plan_.chosen_queue) : 0);
     std::uint32_t queue = 0;
     arguments.push_back(queue);
     for (; queue < plan_.shaders(); ++queue)
-        start(kernels[queue + 1], kernels[queue + 1].resident_blocks, queue + 1);
+        start(kernels[queue + 1], kernels[queue + 1].resident_blocks, laneOf(queue));
 }
 
 void Wavefront::runWave(const std::vector<GpuKernel>& kernels, const kernel::CrtWave& wave,

@@ -20,6 +20,8 @@ struct WavePlan {
     Specs kernels;
     std::uint32_t queue_of_kind[CRT_MATERIAL_NUMBERS] = {};
     std::uint32_t queue_of_choice = CRT_NONE, queue_of_miss = CRT_NONE;
+    /// The only queue that crt_choose_queue fills; CRT_NONE where it fills several.
+    std::uint32_t chosen_queue = CRT_NONE;
     std::uint32_t queues() const { return static_cast<std::uint32_t>(kernels.size() - 1); }
     /// Queues that are shaded: all but that of choices.
     std::uint32_t shaders() const { return queues() - (queue_of_choice != CRT_NONE ? 1 : 0); }
@@ -96,6 +98,9 @@ inline WavePlan planWave(const void* blob) {
     const auto panes = kinds.find(CRT_MATERIAL_THIN_DIELECTRIC);
     if (mixes || panes != kinds.end()) {
         plan.queue_of_choice = plan.queues();
+        // Where no surface is mixed or has holes, a ray that passes no pane meets one.
+        if (scene.compositions.count == 0)
+            plan.chosen_queue = plan.queue_of_kind[CRT_MATERIAL_THIN_DIELECTRIC];
         plan.kernels.push_back({Entry::Choose, others | (panes != kinds.end() ? panes->second : 0)});
     }
     return plan;

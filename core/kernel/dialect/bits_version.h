@@ -16,10 +16,11 @@
  *   7   a sphere that shines is not sampled from its own surface
  *   8   rays pass panes, bodies know what surrounds them, small things keep their digits in large scenes
  *   9   roulette counts the panes that a path has passed
+ *   10  a table has the mean reflectance of a film on a rough metal
  */
 #ifndef CRT_BITS_VERSION_H
 #define CRT_BITS_VERSION_H
 
-#define CRT_BITS_VERSION 9u
+#define CRT_BITS_VERSION 10u
 
 #endif

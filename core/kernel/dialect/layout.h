@@ -245,7 +245,8 @@ CRT_ASSERT_SIZE(CrtLoss, 32);
 typedef struct CrtMaterial {
     u32 type; /* CRT_MATERIAL_… of features.h */
     u32 flags;
-    CrtValue reflectance; /* rough conductors: its mean over the cosine */
+    CrtValue reflectance; /* rough conductors: its mean over the cosine, under the film unless that is
+                             textured */
     CrtValue eta; /* conductors: real part of the index; dielectrics: index inside / outside. OpenPBR's
                      metals: colour seen straight on */
     CrtValue k;   /* conductors: extinction; plastic: share that the coat sends back from below. OpenPBR's
@@ -256,8 +257,8 @@ typedef struct CrtMaterial {
     u32 medium;    /* of what its surface bounds: 1 + its place in CrtScene.media; 0: it bounds none, or no
                       medium    of the scene matters */
     u32 loss; /* rough conductors and dielectrics: index of their CrtLoss */
-    CrtValue film_thickness; /* nm, or of film_scale nm; 0: there is no film */
-    f32 film_scale;
+    CrtValue film_thickness; /* of film_scale: a texture or 1; 0: there is no film */
+    f32 film_scale; /* nm */
     CrtValue film_index; /* relative to the outside */
     f32 widening;  /* anisotropic: the width of GGX along the tangent, over the roughness squared */
     f32 narrowing; /* anisotropic: the width across the tangent over that along it; 0: isotropic */

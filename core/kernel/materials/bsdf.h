@@ -76,10 +76,7 @@ CRT_FN void crt_bsdf_prepare(const CrtContext *ctx, CrtBsdf *b, const CrtSurface
                 if (CRT_HAS(THIN_FILM)) crt_prepare_film(ctx, b, &material, surface, position, splat4(1.0f));
                 if (b->alpha >= CRT_ALPHA_MIN) {
                     b->losses = crt_losses(ctx, material.loss, roughness, splat4(0.0f), 0u);
-                    crt_prepare_metal_loss(b, crt_has_film(b)     ? crt_film_mean(b)
-                                              : crt_is_colored(b) ? crt_colored_mean(b)
-                                                                  : crt_value(ctx, material.reflectance,
-                                                                              surface, position));
+                    crt_prepare_metal_loss(b, crt_metal_mean(ctx, b, &material, surface, position));
                 } else {
                     b->flags |= CRT_BSDF_DELTA;
                     b->reflectance = crt_metal_reflectance(b, crt_min(dot3(wo, b->ns), 1.0f));
