@@ -170,8 +170,8 @@ TEST_CASE("materials: the face's own, the object's, or grey, and equal spectra o
     CHECK(primitives[3].object == 1);
     REQUIRE(materials.size() == 5);
     CHECK(materials[4].type == CRT_MATERIAL_DIFFUSE);
-    CHECK(V4X(crt_value(&ctx, materials[4].reflectance, nullptr, splat4(100))) == 0.5f);
-    CHECK(V4X(crt_value(&ctx, materials[1].reflectance, nullptr, splat4(100))) == 0.1f);
+    CHECK(V4X(crt_value(&ctx, materials[4].of.diffuse.reflectance, nullptr, splat4(100))) == 0.5f);
+    CHECK(V4X(crt_value(&ctx, materials[1].of.diffuse.reflectance, nullptr, splat4(100))) == 0.1f);
     CHECK(ctx.scene->spectra.count == 0);  // constants need no table
     scene.materials[1].reflectance[7] = scene.materials[3].reflectance[7] = 0.25;
     scene.materials[2].reflectance[9] = 0.75;
@@ -179,12 +179,12 @@ TEST_CASE("materials: the face's own, the object's, or grey, and equal spectra o
     scene.meshes[0].material = {1, 0};
     const CompiledScene tables = compiled(scene);
     const auto of_tables = listOf<CrtMaterial>(tables, headerOf(tables).materials);
-    CHECK(of_tables[0].reflectance == of_tables[1].reflectance);
-    CHECK(of_tables[0].reflectance != of_tables[4].reflectance);
+    CHECK(of_tables[0].of.diffuse.reflectance == of_tables[1].of.diffuse.reflectance);
+    CHECK(of_tables[0].of.diffuse.reflectance != of_tables[4].of.diffuse.reflectance);
     CHECK(headerOf(tables).spectra.count == 1);  // nothing has materials 2 and 3
     const CrtContext tables_ctx = contextOf(tables);
-    CHECK(V4X(crt_value(&tables_ctx, of_tables[1].reflectance, nullptr, splat4(7))) == 0.25f);
-    CHECK(V4X(crt_value(&tables_ctx, of_tables[1].reflectance, nullptr, splat4(8))) == 0.1f);
+    CHECK(V4X(crt_value(&tables_ctx, of_tables[1].of.diffuse.reflectance, nullptr, splat4(7))) == 0.25f);
+    CHECK(V4X(crt_value(&tables_ctx, of_tables[1].of.diffuse.reflectance, nullptr, splat4(8))) == 0.1f);
 
     const CompiledScene kinds = changed([](Scene& s) {
         s.materials.resize(5);
@@ -205,9 +205,9 @@ TEST_CASE("materials: the face's own, the object's, or grey, and equal spectra o
     CHECK(m[3].flags == CRT_MATERIAL_TRANSMITS);
     CHECK(m[4].flags == (CRT_MATERIAL_TRANSMITS | CRT_MATERIAL_DISPERSIVE));
     const CrtContext kinds_ctx = contextOf(kinds);
-    CHECK(V4X(crt_value(&kinds_ctx, m[2].eta, nullptr, splat4(7))) == 0.2f);
-    CHECK(V4X(crt_value(&kinds_ctx, m[2].k, nullptr, splat4(7))) == 3);
-    CHECK(V4X(crt_value(&kinds_ctx, m[4].eta, nullptr, splat4(0))) == 1.6f);
+    CHECK(V4X(crt_value(&kinds_ctx, m[2].of.metal.eta, nullptr, splat4(7))) == 0.2f);
+    CHECK(V4X(crt_value(&kinds_ctx, m[2].of.metal.k, nullptr, splat4(7))) == 3);
+    CHECK(V4X(crt_value(&kinds_ctx, m[4].of.glass.eta, nullptr, splat4(0))) == 1.6f);
 }
 
 TEST_CASE("emitters: one a triangle, or one a parallelogram, with its area and side", "[compile]") {
@@ -269,24 +269,9 @@ TEST_CASE("the blob is aligned, and every array in it lies inside", "[compile]")
         CHECK(c.size_bytes % 64 == 0);
         const CrtScene& h = headerOf(c);
         CHECK(h.magic == CRT_SCENE_MAGIC);
-        const std::pair<CrtSpan, std::size_t> arrays[] = {{h.triangles, sizeof(CrtTriangle)},
-                                                          {h.faces, sizeof(CrtFace)},
-                                                          {h.triangles8, sizeof(CrtTriangle8)},
-                                                          {h.occluders8, sizeof(CrtTriangle8)},
-                                                          {h.patches, sizeof(CrtPatch)},
-                                                          {h.occluder_patches, sizeof(CrtPatch)},
-                                                          {h.primitives, sizeof(CrtPrimitive)},
-                                                          {h.normals, sizeof(CrtNormals)},
-                                                          {h.nodes, sizeof(CrtNode4)},
-                                                          {h.objects, sizeof(CrtObject)},
-                                                          {h.materials, sizeof(CrtMaterial)},
-                                                          {h.lights, sizeof(CrtLight)},
-                                                          {h.spectra, CRT_SPECTRUM_STRIDE * sizeof(f32)},
-                                                          {h.observer, sizeof(f32)},
-                                                          {h.wavelengths, sizeof(f32)},
-                                                          {h.filter, sizeof(f32)},
-                                                          {h.point_lights, sizeof(CrtPointLight)},
-                                                          {h.spectral_film, sizeof(CrtSpectralFilm)}};
+#define CRT_ARRAY_SIZE(Row, name, IDENTITY) {h.name, sizeof(Row)},
+        const std::pair<CrtSpan, std::size_t> arrays[] = {CRT_SCENE_ARRAYS(CRT_ARRAY_SIZE)};
+#undef CRT_ARRAY_SIZE
         for (const auto& [span, size] : arrays) {
             if (span.count == 0) continue;
             CHECK(span.offset % 4 == 0);

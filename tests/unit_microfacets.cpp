@@ -158,7 +158,7 @@ TEST_CASE("microfacets: the mean reflectance under a film agrees with quadrature
 TEST_CASE("microfacets: where a texture leaves out a film the metal is bare", "[kernel][bsdf][materials]") {
     CrtContext ctx{};
     CrtMaterial material{};
-    material.reflectance = crt_bits(0.25f);
+    material.of.metal.mean = crt_bits(0.25f);
     CrtBsdf b{};
     b.eta = splat4(2.7f);
     b.k = splat4(3.6f);

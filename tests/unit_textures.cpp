@@ -88,7 +88,8 @@ public:
 
     vec4 value(const CrtSurface& surface, double position) const {
         const CrtMaterial* materials = CRT_ARRAY(CrtMaterial, context_.blob, context_.scene->materials);
-        return crt_value(&context_, materials[0].reflectance, &surface, splat4(static_cast<f32>(position)));
+        return crt_value(&context_, materials[0].of.diffuse.reflectance, &surface,
+                         splat4(static_cast<f32>(position)));
     }
     double opacity(const CrtSurface& surface) const {
         return double{

@@ -58,39 +58,39 @@ kernel::CrtMaterial recordOf(const Material& material, const MaterialTables& tab
     }
     switch (material.type) {
         case MaterialType::Diffuse:
-        case MaterialType::Mirror: record.reflectance = reflectance(); break;
+        case MaterialType::Mirror: record.of.diffuse.reflectance = reflectance(); break;
         case MaterialType::RoughConductor:
             record.roughness = roughness();
             if (material.by_color) {
                 record.flags |= CRT_MATERIAL_OPENPBR;
-                record.eta = reflectance();
-                record.k = spectra.valueOf(material.edge_tint);
-                record.coat = valueOf(material.weight);
+                record.of.metal.eta = reflectance();
+                record.of.metal.k = spectra.valueOf(material.edge_tint);
+                record.of.metal.factor = valueOf(material.weight);
                 break;
             }
             [[fallthrough]];
         case MaterialType::Conductor:
-            record.eta = spectra.valueOf(material.eta);
-            record.k = spectra.valueOf(material.k);
+            record.of.metal.eta = spectra.valueOf(material.eta);
+            record.of.metal.k = spectra.valueOf(material.k);
             if (material.type == MaterialType::RoughConductor)
-                record.reflectance = spectra.valueOf(tables.compensations.mean_reflectance.at(&material));
+                record.of.metal.mean = spectra.valueOf(tables.compensations.mean_reflectance.at(&material));
             break;
         case MaterialType::RoughDielectric: record.roughness = roughness(); [[fallthrough]];
         case MaterialType::Dielectric:
-            record.eta = spectra.valueOf(material.eta);
+            record.of.glass.eta = spectra.valueOf(material.eta);
             if (!material.eta.isConstant()) record.flags |= CRT_MATERIAL_DISPERSIVE;
             if (material.absorption) spectra.valueOf(*material.absorption);  // for numberMedia()
             break;
-        case MaterialType::ThinDielectric: record.eta = spectra.valueOf(material.eta); break;
+        case MaterialType::ThinDielectric: record.of.glass.eta = spectra.valueOf(material.eta); break;
         case MaterialType::Mix:
         case MaterialType::TwoSided: return {};
         case MaterialType::Plastic: {
             const Coat& coat = coatOf(tables.coats, material);
-            record.reflectance = reflectance();
-            record.eta = spectra.valueOf(material.eta);
+            record.of.plastic.reflectance = reflectance();
+            record.of.plastic.eta = spectra.valueOf(material.eta);
             record.roughness = valueOf(material.roughness);
-            record.k = valueOf(coat.internal_reflectance);
-            record.coat = spectra.valueOf(coat.albedo);
+            record.of.plastic.internal = valueOf(coat.internal_reflectance);
+            record.of.plastic.coat = spectra.valueOf(coat.albedo);
             if (material.by_color) record.flags |= CRT_MATERIAL_OPENPBR;
             break;
         }

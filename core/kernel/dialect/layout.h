@@ -38,6 +38,11 @@ typedef struct CrtSpan {
     u32 offset, count;
 } CrtSpan;
 
+/* A tabulated spectrum: a value each nanometre from 360 nm, the last one twice. */
+typedef struct CrtSpectrumRow {
+    f32 values[CRT_SPECTRUM_STRIDE];
+} CrtSpectrumRow;
+
 #define CRT_ARRAY(type, blob, span) ((CRT_GLOBAL const type *)((blob) + (u64)(span).offset * 16u))
 
 /* Geometry of one triangle: x of its three vertices, then y, then z. Or a shape, whose box stands there:
@@ -245,15 +250,27 @@ CRT_ASSERT_SIZE(CrtLoss, 32);
 typedef struct CrtMaterial {
     u32 type; /* CRT_MATERIAL_… of features.h */
     u32 flags;
-    CrtValue reflectance; /* rough conductors: its mean over the cosine, under the film unless that is
-                             textured */
-    CrtValue eta; /* conductors: real part of the index; dielectrics: index inside / outside. OpenPBR's
-                     metals: colour seen straight on */
-    CrtValue k;   /* conductors: extinction; plastic: share that the coat sends back from below. OpenPBR's
-                     metals: tint near the edge */
+    union {
+        struct {
+            CrtValue reflectance;
+        } diffuse; /* and mirrors */
+        struct {
+            CrtValue eta, k; /* index; of OpenPBR's metals the colour straight on and the tint at the edge */
+            CrtValue mean;   /* rough: its reflectance, mean over the cosine, under the film unless that is
+                                textured */
+            CrtValue factor; /* OpenPBR's metals: on their reflectance */
+        } metal;
+        struct {
+            CrtValue eta; /* index inside over outside */
+        } glass; /* dielectrics and panes */
+        struct {
+            CrtValue reflectance;
+            CrtValue eta;
+            CrtValue internal; /* share that the coat sends back from below */
+            CrtValue coat;     /* share that a rough coat reflects, by the cosine: a table; 0: smooth */
+        } plastic;
+    } of; /* by its type */
     CrtValue roughness; /* square root of the width α of GGX */
-    CrtValue coat; /* plastic: share that a rough coat reflects, by the cosine: a table; 0: smooth. OpenPBR's
-                      metals: factor on their reflectance */
     u32 medium;    /* of what its surface bounds: 1 + its place in CrtScene.media; 0: it bounds none, or no
                       medium    of the scene matters */
     u32 loss; /* rough conductors and dielectrics: index of their CrtLoss */
@@ -407,7 +424,7 @@ typedef struct CrtSpectralFilm {
     u32 bins;
     f32 first;         /* lower edge of the first bin, nm above CRT_WAVELENGTH_MIN_NM */
     f32 per_nm;        /* bins in a nanometre */
-    CrtSpan responses; /* count tables of CRT_SPECTRUM_STRIDE floats */
+    CrtSpan responses; /* CrtSpectrumRow */
     u32 reserved[2];
 } CrtSpectralFilm;
 CRT_ASSERT_SIZE(CrtSpectralFilm, 32);
@@ -456,6 +473,64 @@ typedef struct CrtSeed {
     u32 first, second;
 } CrtSeed;
 
+/* The arrays of a compiled scene: F(type of a row, name, IDENTITY). IDENTITY says how the scene's identity
+   hashes an array (core/compile/scene_identity.cpp): ROWS as it is; PLACES by the function with the
+   array's name, because its rows hold places in the blob; SEARCH not at all, because it only speeds up the
+   search for hits.
+
+     triangles          in leaf order when there is a BVH; behind those of the scene, those of meshes that
+                        are instanced
+     faces              by slot
+     triangles8         only for brute force, as all arrays of eight and of patches
+     occluders8         those of them that can come between two points of the scene
+     primitives         by id
+     nodes              root first; only for BVH
+     lights             behind them the CrtLightNode of the tree, if there is one
+     uvs                by id; only where a texture or a tangent needs them
+     vertex_colors      by id; only where a value needs them
+     environment_image  1 or none
+     compositions       as many as materials; or none
+     layers             as many as materials; or none
+     spectral_film      1 or none
+     observer           CRT_SPECTRUM_STRIDE times (x̄, ȳ, z̄, 0) / ∫ȳ dλ
+     wavelengths        CRT_WAVELENGTH_TABLE + 1 nodes of λ(u), nm
+     filter             CRT_FILTER_TABLE + 1 distances from the pixel centre, pixels
+     shapes             where slots are in the order of ids, theirs are the last
+     mesh_nodes         of the meshes that are instanced
+     media              what each medium absorbs, per scene unit
+     patches            all triangles
+     occluder_patches   the triangles that can come between two points of the scene */
+#define CRT_SCENE_ARRAYS(F)                           \
+    F(CrtTriangle, triangles, PLACES)                 \
+    F(CrtFace, faces, SEARCH)                         \
+    F(CrtTriangle8, triangles8, SEARCH)               \
+    F(CrtTriangle8, occluders8, SEARCH)               \
+    F(CrtPrimitive, primitives, ROWS)                 \
+    F(CrtNormals, normals, ROWS)                      \
+    F(CrtNode4, nodes, SEARCH)                        \
+    F(CrtObject, objects, SEARCH)                     \
+    F(CrtMaterial, materials, ROWS)                   \
+    F(CrtLight, lights, PLACES)                       \
+    F(CrtTexture, textures, PLACES)                   \
+    F(CrtUvs, uvs, ROWS)                              \
+    F(CrtVertexColors, vertex_colors, ROWS)           \
+    F(CrtPointLight, point_lights, PLACES)            \
+    F(CrtEnvironmentImage, environment_image, PLACES) \
+    F(CrtComposition, compositions, ROWS)             \
+    F(CrtLayers, layers, ROWS)                        \
+    F(CrtSpectralFilm, spectral_film, PLACES)         \
+    F(CrtLoss, losses, PLACES)                        \
+    F(CrtSpectrumRow, spectra, ROWS)                  \
+    F(f32, observer, ROWS)                            \
+    F(f32, wavelengths, ROWS)                         \
+    F(f32, filter, ROWS)                              \
+    F(CrtShape, shapes, ROWS)                         \
+    F(CrtInstance, instances, PLACES)                 \
+    F(CrtNode4, mesh_nodes, SEARCH)                   \
+    F(CrtValue, media, ROWS)                          \
+    F(CrtPatch, patches, SEARCH)                      \
+    F(CrtPatch, occluder_patches, SEARCH)
+
 typedef struct CrtScene {
     u32 magic;
     u32 environment_light; /* 1 + the index of its CrtLight; 0: light sampling leaves it to scattered rays */
@@ -487,40 +562,13 @@ typedef struct CrtScene {
     u32 triangle_count; /* slots: triangles, shapes and instances */
     u32 tree_lights; /* the first of the lights, between which the tree chooses; 0: there is none */
 
-    CrtSpan triangles;           /* CrtTriangle, in leaf order when there is a BVH */
-    CrtSpan faces;               /* CrtFace, by slot */
-    CrtSpan triangles8;          /* CrtTriangle8, only for brute force */
-    CrtSpan occluders8; /* CrtTriangle8: those of them that can come between two points of the scene */
-    CrtSpan primitives;          /* CrtPrimitive, by id */
-    CrtSpan normals;             /* CrtNormals */
-    CrtSpan nodes;               /* CrtNode4, root first; only for BVH */
-    CrtSpan objects;             /* CrtObject */
-    CrtSpan materials;           /* CrtMaterial */
-    CrtSpan lights;              /* CrtLight; behind them the CrtLightNode of the tree, if there is one */
-    CrtSpan textures;            /* CrtTexture */
-    CrtSpan uvs;                 /* CrtUvs, by id; only where a texture or a tangent needs them */
-    CrtSpan vertex_colors;       /* CrtVertexColors, by id; only where a value needs them */
-    CrtSpan point_lights;        /* CrtPointLight */
-    CrtSpan environment_image;   /* CrtEnvironmentImage, 1 or none */
-    CrtSpan compositions;        /* CrtComposition, as many as materials; or none */
-    CrtSpan layers;              /* CrtLayers, as many as materials; or none */
-    CrtSpan spectral_film;       /* CrtSpectralFilm, 1 or none */
-    CrtSpan losses;              /* CrtLoss */
-    CrtSpan spectra;             /* count spectra of CRT_SPECTRUM_STRIDE floats */
-    CrtSpan observer;            /* CRT_SPECTRUM_STRIDE times (x̄, ȳ, z̄, 0) / ∫ȳ dλ */
-    CrtSpan wavelengths;         /* CRT_WAVELENGTH_TABLE + 1 nodes of λ(u), nm */
-    CrtSpan filter;              /* CRT_FILTER_TABLE + 1 distances from the pixel centre, pixels */
+#define CRT_SCENE_ARRAY(Row, name, IDENTITY) CrtSpan name;
+    CRT_SCENE_ARRAYS(CRT_SCENE_ARRAY)
 
     CrtCamera camera;
 
-    CrtSpan shapes;              /* CrtShape. Where slots are in the order of ids, theirs are the last */
-    CrtSpan instances;           /* CrtInstance */
-    CrtSpan mesh_nodes;          /* CrtNode4 of the meshes that are instanced */
-    CrtSpan media;               /* CrtValue: what each medium absorbs, per scene unit */
     u32 medium_bits;             /* of a medium's number in a list of them (medium.h): 1, 2, 4, 8 or 16 */
     u32 camera_media;            /* list of the media around the camera */
-    CrtSpan patches;             /* CrtPatch, all triangles; only for brute force */
-    CrtSpan occluder_patches;    /* CrtPatch: the triangles that can come between two points of the scene */
     f64 splat_scale;             /* units of a splat's sum in 1: a power of two; 0: the film takes none */
     u32 reserved[2];
 } CrtScene;

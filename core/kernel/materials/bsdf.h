@@ -42,21 +42,21 @@ CRT_FN void crt_bsdf_prepare(const CrtContext *ctx, CrtBsdf *b, const CrtSurface
         case CRT_MATERIAL_DIFFUSE:
             if (CRT_HAS(DIFFUSE)) {
                 b->flags = CRT_BSDF_REFLECTS | CRT_BSDF_RAISES;
-                b->reflectance = crt_value(ctx, material.reflectance, surface, position);
+                b->reflectance = crt_value(ctx, material.of.diffuse.reflectance, surface, position);
                 if (albedo) b->albedo = b->reflectance;
             }
             break;
         case CRT_MATERIAL_MIRROR:
             if (CRT_HAS(MIRROR)) {
                 b->flags = CRT_BSDF_REFLECTS | CRT_BSDF_DELTA;
-                b->reflectance = crt_value(ctx, material.reflectance, surface, position);
+                b->reflectance = crt_value(ctx, material.of.diffuse.reflectance, surface, position);
                 if (albedo) b->albedo = b->reflectance;
             }
             break;
         case CRT_MATERIAL_CONDUCTOR:
             if (CRT_HAS(CONDUCTOR)) {
-                b->eta = crt_value(ctx, material.eta, surface, position);
-                b->k = crt_value(ctx, material.k, surface, position);
+                b->eta = crt_value(ctx, material.of.metal.eta, surface, position);
+                b->k = crt_value(ctx, material.of.metal.k, surface, position);
                 b->flags = CRT_BSDF_REFLECTS | CRT_BSDF_DELTA;
                 if (CRT_HAS(THIN_FILM)) crt_prepare_film(ctx, b, &material, surface, position, splat4(1.0f));
                 b->reflectance = crt_metal_reflectance(b, crt_min(dot3(wo, b->ns), 1.0f));
@@ -67,12 +67,12 @@ CRT_FN void crt_bsdf_prepare(const CrtContext *ctx, CrtBsdf *b, const CrtSurface
             if (CRT_HAS(ROUGH_CONDUCTOR)) {
                 const f32 roughness = V4X(crt_value(ctx, material.roughness, surface, position));
                 b->flags = CRT_BSDF_REFLECTS;
-                b->eta = crt_value(ctx, material.eta, surface, position);
-                b->k = crt_value(ctx, material.k, surface, position);
+                b->eta = crt_value(ctx, material.of.metal.eta, surface, position);
+                b->k = crt_value(ctx, material.of.metal.k, surface, position);
                 b->alpha = roughness * roughness;
                 if (CRT_HAS(ANISOTROPY)) crt_prepare_anisotropy(ctx, b, &material, surface, outside);
                 if ((material.flags & CRT_MATERIAL_OPENPBR) != 0u)
-                    crt_prepare_colors(b, V4X(crt_value(ctx, material.coat, surface, position)));
+                    crt_prepare_colors(b, V4X(crt_value(ctx, material.of.metal.factor, surface, position)));
                 if (CRT_HAS(THIN_FILM)) crt_prepare_film(ctx, b, &material, surface, position, splat4(1.0f));
                 if (b->alpha >= CRT_ALPHA_MIN) {
                     b->losses = crt_losses(ctx, material.loss, roughness, splat4(0.0f), 0u);
@@ -86,7 +86,7 @@ CRT_FN void crt_bsdf_prepare(const CrtContext *ctx, CrtBsdf *b, const CrtSurface
             break;
         case CRT_MATERIAL_DIELECTRIC:
             if (CRT_HAS(DIELECTRIC)) {
-                const vec4 eta = crt_value(ctx, material.eta, surface, position);
+                const vec4 eta = crt_value(ctx, material.of.glass.eta, surface, position);
                 b->flags = CRT_BSDF_REFLECTS | CRT_BSDF_TRANSMITS | CRT_BSDF_DELTA | CRT_BSDF_BOUNDS;
                 if ((material.flags & CRT_MATERIAL_DISPERSIVE) != 0u) b->flags |= CRT_BSDF_DISPERSIVE;
                 b->eta = outside ? eta : splat4(1.0f) / eta;
@@ -100,7 +100,7 @@ CRT_FN void crt_bsdf_prepare(const CrtContext *ctx, CrtBsdf *b, const CrtSurface
         case CRT_MATERIAL_ROUGH_DIELECTRIC:
             if (CRT_HAS(ROUGH_DIELECTRIC)) {
                 const f32 roughness = V4X(crt_value(ctx, material.roughness, surface, position));
-                const vec4 eta = crt_value(ctx, material.eta, surface, position);
+                const vec4 eta = crt_value(ctx, material.of.glass.eta, surface, position);
                 b->flags = CRT_BSDF_REFLECTS | CRT_BSDF_TRANSMITS | CRT_BSDF_BOUNDS;
                 if ((material.flags & CRT_MATERIAL_DISPERSIVE) != 0u) b->flags |= CRT_BSDF_DISPERSIVE;
                 b->eta = outside ? eta : splat4(1.0f) / eta;
@@ -131,17 +131,17 @@ CRT_FN void crt_bsdf_prepare(const CrtContext *ctx, CrtBsdf *b, const CrtSurface
             break;
         case CRT_MATERIAL_PLASTIC:
             if (CRT_HAS(PLASTIC)) {
-                const vec4 base = crt_value(ctx, material.reflectance, surface, position);
+                const vec4 base = crt_value(ctx, material.of.plastic.reflectance, surface, position);
                 const f32 roughness = V4X(crt_value(ctx, material.roughness, surface, position));
-                const f32 eta = V4X(crt_value(ctx, material.eta, surface, position));
-                const f32 k = V4X(crt_value(ctx, material.k, surface, position));
+                const f32 eta = V4X(crt_value(ctx, material.of.plastic.eta, surface, position));
+                const f32 k = V4X(crt_value(ctx, material.of.plastic.internal, surface, position));
                 b->flags = CRT_BSDF_REFLECTS | CRT_BSDF_CHOOSES | CRT_BSDF_RAISES;
                 b->eta = splat4(eta);
                 b->alpha = roughness * roughness;
                 b->coat = 0;
-                if (CRT_HAS(TABLE) && (material.coat & CRT_VALUE_REFERENCE) != 0u)
+                if (CRT_HAS(TABLE) && (material.of.plastic.coat & CRT_VALUE_REFERENCE) != 0u)
                     b->coat = CRT_ARRAY(f32, ctx->blob, ctx->scene->spectra) +
-                              (material.coat & CRT_VALUE_INDEX) * CRT_SPECTRUM_STRIDE;
+                              (material.of.plastic.coat & CRT_VALUE_INDEX) * CRT_SPECTRUM_STRIDE;
                 /* The share of entering light that the base sends back through the coat. */
                 vec4 returned = base * (1.0f - k) / (splat4(1.0f) - base * k);
                 if ((material.flags & CRT_MATERIAL_OPENPBR) != 0u) returned = base;

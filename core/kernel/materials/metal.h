@@ -23,7 +23,7 @@ CRT_FN vec4 crt_metal_mean(const CrtContext *ctx, const CrtBsdf *b, const CrtMat
     const int textured = CRT_HAS(TEXTURE) && crt_from_bits(material->film_thickness) != 1.0f;
     if (textured && crt_has_film(b)) return crt_film_mean(b);
     if (crt_is_colored(b)) return crt_colored_mean(b);
-    return crt_value(ctx, material->reflectance, surface, position);
+    return crt_value(ctx, material->of.metal.mean, surface, position);
 }
 
 CRT_KERNEL_END

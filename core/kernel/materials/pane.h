@@ -50,7 +50,7 @@ CRT_FN vec4 crt_pane_transmittance(const CrtBsdf *b, f32 cos_i) {
 /* Reads what a pane is made of. */
 CRT_FN void crt_prepare_pane(const CrtContext *ctx, CrtBsdf *b, const CrtMaterial *material,
                              const CrtSurface *surface, vec4 position) {
-    b->eta = crt_value(ctx, material->eta, surface, position);
+    b->eta = crt_value(ctx, material->of.glass.eta, surface, position);
     if (CRT_HAS(THIN_FILM)) {
         b->k = b->film_eta = b->film_rounds = splat4(0.0f);
         crt_prepare_film(ctx, b, material, surface, position, splat4(1.0f));
