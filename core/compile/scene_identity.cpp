@@ -97,12 +97,13 @@ private:
     }
     /// A light names its triangle by the place that the tree gave it.
     void lights() {
-        each<CrtLight>(header_.lights, [this](CrtLight light) {
+        const CrtLight* lights = rows<CrtLight>(header_.lights);
+        std::vector<CrtLight> by_id(lights, lights + header_.lights.count);
+        for (CrtLight& light : by_id)
             if (light.kind == CRT_LIGHT_TRIANGLE || light.kind == CRT_LIGHT_PARALLELOGRAM ||
                 light.kind == CRT_LIGHT_SHAPE)
                 light.slot = rows<CrtTriangle>(header_.triangles)[light.slot].id;
-            add(light);
-        });
+        add(by_id.data(), by_id.size());
     }
     void point_lights() {
         each<CrtPointLight>(header_.point_lights, [this](CrtPointLight light) {
