@@ -45,6 +45,7 @@ TEST_CASE("no option relaxes arithmetic", "[cuda]") {
     CHECK(has("--prec-sqrt=true"));
     CHECK(has("--ftz=false"));
     CHECK(has("-DCRT_FEATURES=0x1851ul"));
+    CHECK(has("-DCRT_LEAN=1"));
     for (const std::string& option : options) CHECK(option.find("fast") == std::string::npos);
 }
 

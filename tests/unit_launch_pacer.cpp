@@ -63,6 +63,22 @@ TEST_CASE("launches come to take the wanted time", "[launch_pacer]") {
     for (std::size_t i = 20; i < 60; ++i) CHECK(seconds[i] == Approx(0.02).epsilon(0.6));
 }
 
+TEST_CASE("a launch is at most as many times longer as it may grow", "[launch_pacer]") {
+    for (const double growth : {4.0, 16.0}) {
+        LaunchPacer pacer(1.0, 1 << 14, 1, 1, growth);
+        pacer.begin(renderRange(0, 0, 16, 1 << 20, 0, 100), 0);
+        std::vector<double> paths;
+        for (Launch launch; paths.size() < 3 && pacer.next(launch);) {
+            paths.push_back(static_cast<double>(launch.paths()));
+            pacer.finished(launch, 1e-9 * paths.back());
+        }
+        REQUIRE(paths.size() == 3);
+        // Up to the division of the rows that are left into equal parts.
+        for (std::size_t i = 1; i < paths.size(); ++i)
+            CHECK(paths[i] / paths[i - 1] == Approx(growth).epsilon(0.02));
+    }
+}
+
 TEST_CASE("a device whose clock says nothing does not make launches grow", "[launch_pacer]") {
     // Start and end the same, in the wrong order, a tick apart, or far apart; the host waited all the same.
     using crt::launchSeconds;

@@ -179,6 +179,31 @@ TEST_CASE("no two queues are one, and there is room for all", "[wavefront]") {
     CHECK(plan.queues() <= CRT_WAVE_QUEUES);
 }
 
+TEST_CASE("the slices of a wave take each sample of each pixel once", "[wavefront]") {
+    for (const std::uint32_t samples : {1u, 7u, 64u, 199u})
+        for (const std::uint32_t slices : {1u, 3u, 7u, 64u}) {
+            if (slices > samples) continue;
+            crt::kernel::CrtWave wave{};
+            wave.x0 = 16, wave.y0 = 8, wave.x1 = 16 + 37, wave.y1 = 8 + 11;  // no whole number of blocks
+            crt::kernel::crt_wave_divide(&wave, samples, slices);
+            crt::kernel::crt_wave_lay_out(&wave, 1, nullptr, nullptr);
+            std::vector<std::vector<std::uint32_t>> taken(37 * 11, std::vector<std::uint32_t>(samples));
+            std::uint32_t least = samples, most = 0;
+            for (std::uint32_t slot = 0; slot < wave.slots; ++slot) {
+                const crt::kernel::CrtWaveShare share = crt::kernel::crt_wave_share(&wave, slot);
+                if (share.count == 0) continue;  // beyond the edge
+                REQUIRE(share.slice < slices);
+                for (std::uint32_t i = 0; i < share.count; ++i)
+                    ++taken.at((share.y - 8) * 37 + (share.x - 16)).at(share.first + i);
+                least = std::min(least, share.count);
+                most = std::max(most, share.count);
+            }
+            for (const std::vector<std::uint32_t>& pixel : taken)
+                REQUIRE(std::set<std::uint32_t>(pixel.begin(), pixel.end()) == std::set<std::uint32_t>{1});
+            CHECK(most - least <= 1);
+        }
+}
+
 namespace {
 
 /// A device that runs nothing: it notes what is launched, and answers that all slots are done.

@@ -53,6 +53,7 @@ std::vector<std::string> nvrtcOptions(int arch, const KernelSpec& spec, int bloc
             "--ftz=false",
             "--ptxas-options=-v",
             mask,
+            "-DCRT_LEAN=1",
             "-DCRT_ENTRIES=" + std::to_string(static_cast<std::uint32_t>(spec.entry)),
             "-DCRT_BLOCKS_PER_SM=" + std::to_string(blocks_per_multiprocessor)};
 }

@@ -18,12 +18,15 @@ namespace {
 
 /// Wanted duration of a wave: long, because its last passes have few paths left.
 constexpr double kWaveSeconds = 0.6;
+/// The size of a launch over that of the one before, at most. A wave looks in between if it should stop.
+constexpr double kLaunchGrowth = 4, kWaveGrowth = 16;
 /// Pairs of ray counters, as in kernels.h.
 constexpr std::uint32_t kRayCounters = 1024;
 
 LaunchPacer pacerFor(bool waves, const DeviceTraits& device) {
     return LaunchPacer(waves ? kWaveSeconds : device.launch_seconds, device.first_paths,
-                       waves ? CRT_WAVE_BLOCK_HEIGHT : device.block_height, device.least_paths);
+                       waves ? CRT_WAVE_BLOCK_HEIGHT : device.block_height, device.least_paths,
+                       waves ? kWaveGrowth : kLaunchGrowth);
 }
 
 /// Thrown out of a launch when the host wants to stop.

@@ -13,10 +13,9 @@ namespace {
 
 /// Slots of a wave: enough to fill any GPU many times over.
 constexpr std::uint64_t kMostSlots = std::uint64_t{1} << 22;
-/// Between two looks at how many slots are done. A pass without any costs a few microseconds.
-constexpr std::uint64_t kPassesAtOnce = 4;
-/// The same while no slot can be done: some tens of milliseconds, so that the host may stop the wave.
-constexpr std::uint64_t kFirstPassesAtOnce = 16;
+/// Between two looks at how many slots are done: some tens of milliseconds, so that the host may stop the
+/// wave. A pass without any slot costs a few microseconds.
+constexpr std::uint64_t kPassesAtOnce = 16;
 
 /// As kernels see it; the host cannot read there, and a kernel of OpenCL lays out the wave again.
 template <class T>
@@ -73,8 +72,7 @@ kernel::CrtWave Wavefront::waveOf(const Launch& part, std::uint32_t slices,
     wave.x1 = part.x1;
     wave.y1 = part.y1;
     wave.first_sample = part.first_sample;
-    wave.sample_count = part.sample_count;
-    wave.slices = slices;
+    kernel::crt_wave_divide(&wave, part.sample_count, slices);
     std::copy(std::begin(plan_.queue_of_kind), std::end(plan_.queue_of_kind), wave.queue_of_kind);
     wave.queue_of_choice = plan_.queue_of_choice;
     wave.queue_of_miss = plan_.queue_of_miss;
@@ -125,9 +123,9 @@ void Wavefront::runWave(const std::vector<GpuKernel>& kernels, const kernel::Crt
     device_.fill(words_, 0, (words - lengths) * kWord, lengths * kWord);
     if (header_.handle != nullptr) device_.write(header_, &wave);
     // No sample takes fewer passes than one, and the last is added in one more.
-    const std::uint64_t least = divideUp(wave.sample_count, wave.slices) + 1;
+    const std::uint64_t least = std::uint64_t{wave.slice_samples} + (wave.longer_slices != 0 ? 1 : 0) + 1;
     for (std::uint32_t pass = 0, done = 0;;) {
-        std::uint64_t more = pass < least ? std::min(least - pass, kFirstPassesAtOnce) : kPassesAtOnce;
+        std::uint64_t more = pass < least ? std::min(least - pass, kPassesAtOnce) : kPassesAtOnce;
         for (; more != 0; --more) runPass(kernels, wave, target, pass++);
         device_.read(words_, &done, (words - 1) * kWord, kWord);
         if (done >= wave.slots) return;

@@ -142,12 +142,13 @@ std::string buildOptions(const Device& device, const gpu::KernelSpec& spec) {
     // A GPU's lanes are its work-items: eight-wide vectors only cost it registers.
     const int simd8 = device.is_cpu ? 1 : 0;
     const unsigned side = blockSide(device);
+    const int lean = spec.features != CRT_FEATURES_ALL ? 1 : 0;
     char options[256];
     std::snprintf(options, sizeof options,
-                  "-cl-std=CL1.2 -DCRT_ENTRIES=%u -DCRT_FEATURES=0x%llxul -DCRT_SIMD8=%d "
+                  "-cl-std=CL1.2 -DCRT_ENTRIES=%u -DCRT_FEATURES=0x%llxul -DCRT_LEAN=%d -DCRT_SIMD8=%d "
                   "-DCRT_BLOCK_WIDTH=%uu -DCRT_BLOCK_HEIGHT=%uu",
-                  static_cast<unsigned>(spec.entry), static_cast<unsigned long long>(spec.features), simd8,
-                  side, side);
+                  static_cast<unsigned>(spec.entry), static_cast<unsigned long long>(spec.features), lean,
+                  simd8, side, side);
     return options +
            std::string(device.has_correct_division_option ? " -cl-fp32-correctly-rounded-divide-sqrt" : "");
 }

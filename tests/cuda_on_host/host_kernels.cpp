@@ -111,8 +111,7 @@ void launchWave(const void* scene_blob, const Launch& launch, std::uint32_t slic
     wave.x1 = launch.x1;
     wave.y1 = launch.y1;
     wave.first_sample = launch.first_sample;
-    wave.sample_count = launch.sample_count;
-    wave.slices = slices;
+    crt_wave_divide(&wave, launch.sample_count, slices);
     crt_wave_lay_out(&wave, kQueues, nullptr, nullptr);
     std::vector<vec4> rows(std::size_t{wave.slots} * crt_wave_rows(CRT_FEATURES_ALL));
     std::vector<u32> words(CRT_WAVE_WORDS(std::size_t{wave.slots}, kQueues));

@@ -47,11 +47,14 @@ public:
     /// Launches are cut between rows that are multiples of `row_step` apart where the budget allows it, for
     /// devices that work on blocks of pixels. `least_paths` is how many paths the device traces beside each
     /// other in about the time of the longest: smaller launches would be more, and none of them shorter.
+    /// `most_growth`: a launch over the one before, since neighbouring parts of an image may differ much in
+    /// cost. A launch that can be stopped in between may grow faster.
     LaunchPacer(double target_seconds, std::uint64_t first_paths, std::uint32_t row_step = 1,
-                std::uint64_t least_paths = 1)
+                std::uint64_t least_paths = 1, double most_growth = 4)
         : target_seconds_(target_seconds),
           least_(static_cast<double>(least_paths)),
           budget_(std::max(static_cast<double>(first_paths), least_)),
+          most_growth_(most_growth),
           row_step_(row_step) {}
 
     /// Starts a range. `tile_size` 0 works through it in the largest pieces that the budget allows.
@@ -87,8 +90,9 @@ public:
         const double fitting = paths * target_seconds_ / std::max(seconds, 1e-6);
         // A launch much below the budget says little about larger ones: its fixed cost hides the rate.
         if (paths < 0.4 * budget_ && seconds < target_seconds_) return;
-        // Half-way, and at most four times as much: neighbouring parts of an image may differ much in cost.
-        budget_ = std::max(std::clamp(0.5 * (budget_ + fitting), 0.25 * budget_, 4.0 * budget_), least_);
+        // Half-way, because one part of an image says little about the next.
+        budget_ =
+            std::max(std::clamp(0.5 * (budget_ + fitting), 0.25 * budget_, most_growth_ * budget_), least_);
     }
 
     /// Share of the range that is finished.
@@ -149,6 +153,7 @@ private:
     double target_seconds_;
     double least_;   ///< Paths of the smallest launch that is worth one.
     double budget_;  ///< Paths that one launch should trace.
+    double most_growth_;
     std::uint32_t row_step_;
 
     CrtRenderRange range_{};

@@ -118,4 +118,13 @@ enum CrtTextureKind {
 #define CRT_IN_MASK(mask, name) ((((mask) >> CRT_BIT_##name) & 1ul) != 0ul)
 #define CRT_HAS(name) CRT_IN_MASK(CRT_FEATURES, name)
 
+/* True if this kernel and the scene have a feature. CRT_LEAN is 1 where the kernel is compiled for scenes
+   that have all of its features: then this is known while it is compiled, and the other case is left out. */
+#ifndef CRT_LEAN
+#define CRT_LEAN 0
+#endif
+#define CRT_SCENE_HAS(scene, name) \
+    (CRT_HAS(name) &&              \
+     ((CRT_LEAN && CRT_IN_MASK(CRT_FEATURES, name)) || CRT_IN_MASK((scene)->features, name)))
+
 #endif

@@ -53,7 +53,7 @@ CRT_FN f32 crt_box(CRT_GLOBAL const f32 *lower, CRT_GLOBAL const f32 *upper, Crt
 /* A ray for the tests of a tree's nodes: 1/d and, for near and far planes, the terms that turn a plane's
    coordinate into its distance along the ray. */
 typedef struct CrtNodeRay {
-    u32 near_x, near_y, near_z; /* as of CrtSlab */
+    u32 near_x, near_y, near_z; /* as of CrtSlab; the signs of 1/d, too, tell them */
     vec3 inverse, near, far;
 } CrtNodeRay;
 
@@ -94,18 +94,24 @@ CRT_FN CrtNodeRay crt_node_ray(CrtRay ray, f32 slack) {
    `limit` by more than rounding are missed. */
 CRT_FN vec4 crt_node_distances(CRT_GLOBAL const CrtNode4 *node, CrtNodeRay ray, f32 limit) {
     CRT_GLOBAL const f32 *planes = &node->bounds[0][0];
+#if CRT_SIMD8
+    const u32 near_x = ray.near_x, near_y = ray.near_y, near_z = ray.near_z;
+#else /* a GPU has no registers to keep them in */
+    const u32 near_x = crt_bits(V3X(ray.inverse)) >> 31, near_y = 2u + (crt_bits(V3Y(ray.inverse)) >> 31),
+              near_z = 4u + (crt_bits(V3Z(ray.inverse)) >> 31);
+#endif
     const vec4 ix = splat4(V3X(ray.inverse)), iy = splat4(V3Y(ray.inverse)), iz = splat4(V3Z(ray.inverse));
     const vec4 enter = crt_cull_max4(
-        crt_fma4(crt_load4(planes + 4u * ray.near_z), iz, splat4(V3Z(ray.near))),
-        crt_cull_max4(crt_fma4(crt_load4(planes + 4u * ray.near_y), iy, splat4(V3Y(ray.near))),
-                      crt_cull_max4(crt_fma4(crt_load4(planes + 4u * ray.near_x), ix, splat4(V3X(ray.near))),
+        crt_fma4(crt_load4(planes + 4u * near_z), iz, splat4(V3Z(ray.near))),
+        crt_cull_max4(crt_fma4(crt_load4(planes + 4u * near_y), iy, splat4(V3Y(ray.near))),
+                      crt_cull_max4(crt_fma4(crt_load4(planes + 4u * near_x), ix, splat4(V3X(ray.near))),
                                     splat4(0.0f))));
     const vec4 leave = crt_cull_min4(
-        crt_fma4(crt_load4(planes + 4u * (ray.near_z ^ 1u)), iz, splat4(V3Z(ray.far))),
-        crt_cull_min4(crt_fma4(crt_load4(planes + 4u * (ray.near_y ^ 1u)), iy, splat4(V3Y(ray.far))),
-                      crt_cull_min4(crt_fma4(crt_load4(planes + 4u * (ray.near_x ^ 1u)), ix,
-                                             splat4(V3X(ray.far))),
-                                    splat4(limit * CRT_SLAB_SLACK))));
+        crt_fma4(crt_load4(planes + 4u * (near_z ^ 1u)), iz, splat4(V3Z(ray.far))),
+        crt_cull_min4(
+            crt_fma4(crt_load4(planes + 4u * (near_y ^ 1u)), iy, splat4(V3Y(ray.far))),
+            crt_cull_min4(crt_fma4(crt_load4(planes + 4u * (near_x ^ 1u)), ix, splat4(V3X(ray.far))),
+                          splat4(limit * CRT_SLAB_SLACK))));
     return make_vec4(V4X(enter) <= V4X(leave) ? V4X(enter) : CRT_INFINITY,
                      V4Y(enter) <= V4Y(leave) ? V4Y(enter) : CRT_INFINITY,
                      V4Z(enter) <= V4Z(leave) ? V4Z(enter) : CRT_INFINITY,
@@ -161,13 +167,27 @@ CRT_FN int crt_next_stacked(const u64 *stack, u32 *size, f32 t, u32 *current) {
     return 0;
 }
 
-/* All children that a ray enters at t go onto the stack, in any order. Returns its size. */
-CRT_FN u32 crt_enter_all(CRT_GLOBAL const CrtNode4 *node, vec4 t, u32 *stack, u32 size) {
-    if (V4X(t) < CRT_INFINITY) { stack[size] = node->child[0]; ++size; }
-    if (V4Y(t) < CRT_INFINITY) { stack[size] = node->child[1]; ++size; }
-    if (V4Z(t) < CRT_INFINITY) { stack[size] = node->child[2]; ++size; }
-    if (V4W(t) < CRT_INFINITY) { stack[size] = node->child[3]; ++size; }
-    return size;
+/* One of the children that a ray enters at t becomes `current`; the others go onto the stack, in any order.
+   0: it enters none. */
+CRT_FN int crt_enter_any(CRT_GLOBAL const CrtNode4 *node, vec4 t, u32 *stack, u32 *size, u32 *current) {
+    const vec4 child = crt_load4((CRT_GLOBAL const f32 *)node->child); /* in one wide load */
+    u32 next = CRT_NONE;
+    if (V4X(t) < CRT_INFINITY) next = crt_bits(V4X(child));
+#define CRT_ENTER_ANY(LANE)           \
+    if (LANE(t) < CRT_INFINITY) {     \
+        if (next != CRT_NONE) {       \
+            stack[*size] = next;      \
+            ++*size;                  \
+        }                             \
+        next = crt_bits(LANE(child)); \
+    }
+    CRT_ENTER_ANY(V4Y)
+    CRT_ENTER_ANY(V4Z)
+    CRT_ENTER_ANY(V4W)
+#undef CRT_ENTER_ANY
+    if (next == CRT_NONE) return 0;
+    *current = next;
+    return 1;
 }
 
 /* Tests of boxes accept NaN, so that they lose no box that is touched. They would accept unused children

@@ -152,16 +152,14 @@ CRT_FN int crt_bvh_any(const CrtContext *ctx, CrtRay ray, CrtPassable *passable)
     if (!crt_is_ray(ray)) return 0;
     u32 stack[CRT_BVH_STACK];
 #if CRT_SIMD8
-    u32 size = 1u;
-    stack[0] = 0u;
-    while (size != 0u) {
-        --size;
-        const u32 current = stack[size];
+    u32 size = 0u;
+    u32 current = 0u; /* the root: node 0 */
+    for (;;) {
         const u32 count = current & 15u;
         if (count == 0u) {
             CRT_GLOBAL const CrtNode4 *node = nodes + (current >> 4);
             const vec4 t = crt_node_distances(node, among, ray.reach);
-            size = crt_enter_all(node, t, stack, size);
+            if (crt_enter_any(node, t, stack, &size, &current)) continue;
         } else {
             const u32 first = current >> 4;
             for (u32 i = 0u; i < count; ++i)
@@ -170,15 +168,18 @@ CRT_FN int crt_bvh_any(const CrtContext *ctx, CrtRay ray, CrtPassable *passable)
                         : crt_triangle_stops(ctx, triangles, first + i, shear, ray.reach, passable))
                     return 1;
         }
+        if (size == 0u) return 0;
+        --size;
+        current = stack[size];
     }
-    return 0;
 #else
     u32 size = 0u;
     u32 current = 0u; /* the root: node 0 */
     for (;;) {
         while ((current & 15u) == 0u) {
             CRT_GLOBAL const CrtNode4 *node = nodes + (current >> 4);
-            size = crt_enter_all(node, crt_node_distances(node, among, ray.reach), stack, size);
+            const vec4 t = crt_node_distances(node, among, ray.reach);
+            if (crt_enter_any(node, t, stack, &size, &current)) continue;
             if (size == 0u) return 0;
             --size;
             current = stack[size];

@@ -28,6 +28,15 @@ CRT_FN CrtHit crt_no_hit(f32 reach) {
     return hit;
 }
 
+/* The primitive id of what a slot holds, if `instance` (as of CrtHit) has it. */
+CRT_FN u32 crt_id_of(const CrtContext *ctx, u32 slot, u32 instance) {
+    const u32 id = CRT_ARRAY(CrtTriangle, ctx->blob, ctx->scene->triangles)[slot].id;
+    if (!CRT_HAS(INSTANCES) || instance == 0u) return id;
+    CRT_GLOBAL const CrtInstance *of =
+        CRT_ARRAY(CrtInstance, ctx->blob, ctx->scene->instances) + (instance - 1u);
+    return of->first_id + (id - of->first_primitive);
+}
+
 /* The number of the primitive that was hit, of an instance that of its mesh. */
 CRT_FN u32 crt_primitive_of(const CrtContext *ctx, CrtHit hit) {
     if (CRT_HAS(INSTANCES) && hit.instance != 0u)

@@ -132,31 +132,32 @@ CRT_FN int crt_instance_any(const CrtContext *ctx, u32 index, CrtRay ray, CrtShe
     const CrtNodeRay mesh = crt_mesh_ray(instance, ray);
     u32 stack[CRT_BVH_STACK];
 #if CRT_SIMD8
-    u32 size = 1u;
-    stack[0] = instance->root << 4;
-    while (size != 0u) {
-        --size;
-        const u32 current = stack[size];
+    u32 size = 0u;
+    u32 current = instance->root << 4;
+    for (;;) {
         const u32 count = current & 15u;
         if (count == 0u) {
             CRT_GLOBAL const CrtNode4 *node = nodes + (current >> 4);
             const vec4 t = crt_node_distances(node, mesh, ray.reach);
-            size = crt_enter_all(node, t, stack, size);
+            if (crt_enter_any(node, t, stack, &size, &current)) continue;
         } else {
             const u32 first = current >> 4;
             for (u32 i = 0u; i < count; ++i)
                 if (crt_placed_stops(ctx, instance, index, triangles, first + i, shear, ray.reach, passable))
                     return 1;
         }
+        if (size == 0u) return 0;
+        --size;
+        current = stack[size];
     }
-    return 0;
 #else
     u32 size = 0u;
     u32 current = instance->root << 4;
     for (;;) {
         while ((current & 15u) == 0u) {
             CRT_GLOBAL const CrtNode4 *node = nodes + (current >> 4);
-            size = crt_enter_all(node, crt_node_distances(node, mesh, ray.reach), stack, size);
+            const vec4 t = crt_node_distances(node, mesh, ray.reach);
+            if (crt_enter_any(node, t, stack, &size, &current)) continue;
             if (size == 0u) return 0;
             --size;
             current = stack[size];

@@ -10,22 +10,26 @@
 
 CRT_KERNEL_BEGIN
 
-/* The surfaces met so far that a shadow ray may pass. Only scenes with panes read and write it. */
+/* The surfaces met so far that a shadow ray may pass. Only scenes with panes read and write it. A search
+   holds it in registers, so that it is less than the hit of the nearest surface: crt_hit_of_slot (slots.h)
+   gives that. */
 typedef struct CrtPassable {
-    CrtHit nearest; /* with slot CRT_NONE if there is none */
-    u32 count;      /* 0: none; 1: `nearest` is the only one; more: others may be behind it */
+    f32 t;        /* of the nearest one */
+    u32 slot;     /* of the same; CRT_NONE: there is none */
+    u32 instance; /* as of CrtHit */
+    u32 count;    /* 0: none; 1: the nearest is the only one; more: others may be behind it */
 } CrtPassable;
 
 CRT_FN CrtPassable crt_none_passable(f32 reach) {
     CrtPassable passable;
-    passable.nearest = crt_no_hit(reach);
+    passable.t = reach;
+    passable.slot = CRT_NONE;
+    passable.instance = 0u;
     passable.count = 0u;
     return passable;
 }
 
-CRT_FN int crt_has_panes(const CrtContext *ctx) {
-    return CRT_HAS(THIN_DIELECTRIC) && CRT_IN_MASK(ctx->scene->features, THIN_DIELECTRIC);
-}
+CRT_FN int crt_has_panes(const CrtContext *ctx) { return CRT_SCENE_HAS(ctx->scene, THIN_DIELECTRIC); }
 
 /* In a scene with panes: true if a ray may pass the surface that it meets, or meets a mix. crt_passes
    decides. */
@@ -45,8 +49,12 @@ CRT_FN int crt_may_pass(const CrtContext *ctx, CrtHit hit) {
 CRT_FN int crt_stops(const CrtContext *ctx, CrtHit hit, u32 hits, CrtPassable *passable) {
     if (!crt_has_panes(ctx)) return 1;
     if (!crt_may_pass(ctx, hit)) return 1;
-    if (hit.t < crt_tie_limit(passable->nearest.t))
-        crt_keep_nearer(hit.t, hit.b1, hit.b2, hit.slot, hit.id, hit.instance, &passable->nearest);
+    if (hit.t < passable->t ||
+        (hit.t == passable->t && hit.id < crt_id_of(ctx, passable->slot, passable->instance))) {
+        passable->t = hit.t;
+        passable->slot = hit.slot;
+        if (CRT_HAS(INSTANCES)) passable->instance = hit.instance;
+    }
     passable->count += hits;
     return 0;
 }

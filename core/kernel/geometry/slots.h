@@ -36,6 +36,19 @@ CRT_FN int crt_slot_stops(const CrtContext *ctx, CRT_GLOBAL const CrtTriangle *t
     return crt_triangle_stops(ctx, triangles, slot, shear, ray.reach, passable);
 }
 
+/* The hit of what the slot holds, if `instance` (as of CrtHit) has it. Slot CRT_NONE: none. */
+CRT_FN CrtHit crt_hit_of_slot(const CrtContext *ctx, CrtRay ray, u32 slot, u32 instance) {
+    CRT_GLOBAL const CrtTriangle *triangles = CRT_ARRAY(CrtTriangle, ctx->blob, ctx->scene->triangles);
+    CrtHit hit = crt_no_hit(ray.reach);
+    if (slot == CRT_NONE) return hit;
+    const CrtShear shear = crt_shear(ray);
+    if (CRT_HAS(INSTANCES) && instance != 0u)
+        crt_test_placed(crt_instance(ctx, instance - 1u), instance - 1u, triangles, slot, shear, &hit);
+    else
+        crt_test_slot(ctx, triangles, slot, ray, shear, &hit);
+    return hit;
+}
+
 CRT_KERNEL_END
 
 #endif

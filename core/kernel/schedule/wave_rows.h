@@ -44,13 +44,13 @@ CRT_FN u32 crt_wave_rows(u64 features) {
     return CRT_ROW_SIDE;
 }
 
-/* A launch: samples [first_sample, first_sample + sample_count) of the pixels [x0, x1) × [y0, y1), and
-   where its slots are kept. */
+/* A launch: samples from first_sample on of the pixels [x0, x1) × [y0, y1), and where slots are kept. */
 typedef struct CrtWave {
     u32 x0, y0, x1, y1;
     u64 first_sample;
-    u32 sample_count;
     u32 slices;           /* each adds to a separate film */
+    u32 slice_samples;    /* of a slice: divided once, and not by each slot */
+    u32 longer_slices;    /* the first ones, which have one sample more */
     u32 blocks_per_slice;
     u32 slots;            /* slices · blocks_per_slice · CRT_WAVE_BLOCK */
     CRT_GLOBAL vec4 *rows;
@@ -66,10 +66,17 @@ typedef struct CrtWave {
     u32 queue_of_choice;      /* whose slots go on to other queues, or are traced on (crt_wave_choose) */
     u32 queue_of_miss;        /* CRT_NONE: nothing shines there */
 } CrtWave;
-CRT_ASSERT_SIZE(CrtWave, 392);
+CRT_ASSERT_SIZE(CrtWave, 400);
 
 /* Words of 4 bytes that slots and queues take besides the rows. */
 #define CRT_WAVE_WORDS(slots, queues) ((slots) * (3u + (queues)) + 2u * CRT_WAVE_QUEUES + 1u)
+
+/* Divides the samples between the slices. The host calls this. */
+CRT_FN void crt_wave_divide(CrtWave *wave, u32 sample_count, u32 slices) {
+    wave->slices = slices;
+    wave->slice_samples = sample_count / slices;
+    wave->longer_slices = sample_count % slices;
+}
 
 /* Sets the number of slots for the wave's pixels and slices, and where each of their arrays begins. The
    host calls this. */
@@ -102,9 +109,11 @@ CRT_FN CrtWaveShare crt_wave_share(const CrtWave *wave, u32 slot) {
     share.slice = block / wave->blocks_per_slice;
     share.x = wave->x0 + (tile % across) * CRT_WAVE_BLOCK_WIDTH + (warp % 2u) * 8u + lane % 8u;
     share.y = wave->y0 + (tile / across) * CRT_WAVE_BLOCK_HEIGHT + (warp / 2u) * 4u + lane / 8u;
-    share.first = (u32)((u64)wave->sample_count * share.slice / wave->slices);
-    const u32 end = (u32)((u64)wave->sample_count * (share.slice + 1u) / wave->slices);
-    share.count = share.x < wave->x1 && share.y < wave->y1 ? end - share.first : 0u;
+    share.first = share.slice * wave->slice_samples +
+                  (share.slice < wave->longer_slices ? share.slice : wave->longer_slices);
+    share.count = share.x < wave->x1 && share.y < wave->y1
+                      ? wave->slice_samples + (share.slice < wave->longer_slices ? 1u : 0u)
+                      : 0u;
     return share;
 }
 
@@ -120,9 +129,7 @@ CRT_FN vec4 crt_row_of(vec3 v, f32 w) { return make_vec4(V3X(v), V3Y(v), V3Z(v),
 CRT_FN vec3 crt_row_vector(vec4 row) { return make_vec3(V4X(row), V4Y(row), V4Z(row)); }
 
 /* True if the wave has the rows of the first hit. */
-CRT_FN int crt_wave_has_first_hit(const CrtContext *ctx) {
-    return CRT_HAS(AOV) && CRT_IN_MASK(ctx->scene->features, AOV);
-}
+CRT_FN int crt_wave_has_first_hit(const CrtContext *ctx) { return CRT_SCENE_HAS(ctx->scene, AOV); }
 
 /* The random numbers of the slot's sample, as its path left them. */
 CRT_FN CrtSampler crt_load_sampler(const CrtContext *ctx, const CrtWave *wave, u32 slot) {
@@ -233,6 +240,14 @@ CRT_FN void crt_store_hit(const CrtWave *wave, u32 slot, CrtHit hit) {
     *crt_row(wave, CRT_ROW_HIT_IDS, slot) =
         make_vec4(crt_from_bits(hit.id), crt_from_bits(CRT_HAS(INSTANCES) ? hit.instance : 0u),
                   crt_from_bits(CRT_NONE), 0.0f);
+}
+
+/* What crt_hit_of_slot needs for the hit of a surface that a shadow ray may pass. */
+CRT_FN void crt_store_passable(const CrtWave *wave, u32 slot, CrtPassable met) {
+    CrtHit hit = crt_no_hit(met.t);
+    hit.slot = met.slot;
+    hit.instance = met.instance;
+    crt_store_hit(wave, slot, hit);
 }
 
 CRT_FN CrtRay crt_load_shadow_ray(const CrtWave *wave, u32 slot) {

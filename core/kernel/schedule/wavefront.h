@@ -75,7 +75,7 @@ CRT_FN int crt_wave_resolve_shadow(const CrtContext *ctx, const CrtWave *wave, u
             CrtPassable met = crt_none_passable(ray.reach);
             blocked = crt_trace_any(ctx, ray, &met);
             if (!blocked && met.count != 0u) {
-                crt_store_hit(wave, slot, met.nearest);
+                crt_store_passable(wave, slot, met);
                 if (met.count == 1u) wave->state[slot] = state | CRT_WAVE_LAST;
                 return 0;
             }
@@ -166,7 +166,9 @@ CRT_FN int crt_wave_passes(const CrtContext *ctx, const CrtWave *wave, u32 slot)
     CrtRay ray = shadow ? crt_load_shadow_ray(wave, slot) : crt_load_path_ray(wave, slot);
     if (!shadow && (state & CRT_WAVE_PASSED) != 0u)
         ray.o = crt_row_vector(*crt_row(wave, CRT_ROW_PASSED, slot));
-    const int passes = crt_passes(ctx, crt_load_hit(wave, slot), &sampler, &way, &ray);
+    CrtHit hit = crt_load_hit(wave, slot);
+    if (shadow) hit = crt_hit_of_slot(ctx, ray, hit.slot, hit.instance); /* crt_store_passable */
+    const int passes = crt_passes(ctx, hit, &sampler, &way, &ray);
     crt_store_xorshift(ctx, wave, slot, &sampler);
     const int last = (state & CRT_WAVE_LAST) != 0u;
     wave->state[slot] = passes && !last ? state | CRT_WAVE_PASSED : state & CRT_WAVE_ENDED;

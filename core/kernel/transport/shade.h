@@ -23,7 +23,7 @@ CRT_FN void crt_path_begin(const CrtContext *ctx, CrtPath *path, u32 x, u32 y, u
     path->ray = crt_camera_ray(ctx, &path->sampler, pixel_x, pixel_y);
     path->wavelengths = crt_sample_wavelengths(ctx, crt_sample_1d(&path->sampler, CRT_DIM_WAVELENGTH));
     path->hero = make_vec4(1.0f, 0.0f, 0.0f, 0.0f);
-    if (CRT_HAS(DISPERSION) && CRT_IN_MASK(scene->features, DISPERSION))
+    if (CRT_SCENE_HAS(scene, DISPERSION))
         path->hero = crt_hero_lane(crt_sample_bits(&path->sampler, CRT_DIM_HERO) >> 30);
     path->throughput = splat4(1.0f);
     path->radiance = splat4(0.0f);
