@@ -211,6 +211,37 @@ TEST_CASE("trees of instances find what a loop over their triangles finds, bit b
     CHECK(hits > rays / 3);
 }
 
+TEST_CASE("a shadow ray keeps the nearest pane of instances, triangles and shapes, bit by bit",
+          "[instances]") {
+    Random random(3702);
+    std::uint64_t of_instances = 0, of_others = 0, none = 0, wrong = 0;
+    Scene scene = crowd(random, kGentle, Sharing::Always);
+    scene.materials[0] = {};
+    scene.materials[0].type = crt::MaterialType::ThinDielectric;
+    scene.materials[0].eta = crt::constantSpectrum(1.5);
+    const CompiledScene compiled = crt::compileScene(scene, 0);
+    const CrtContext ctx = contextOf(compiled);
+    REQUIRE((ctx.scene->features & CRT_FEATURE_THIN_DIELECTRIC) != 0);
+    for (int i = 0; i < 40000; ++i) {
+        CrtRay ray = rayAtInstance(ctx, random);
+        if (random.below(4) == 0) ray.reach = static_cast<f32>(random.uniform());
+        CrtPassable met = crt_none_passable(ray.reach);
+        // All are panes, so that nothing stops it.
+        REQUIRE(crt_bvh_any(&ctx, ray, &met) == 0);
+        const CrtHit nearest = crt_bvh_closest(&ctx, ray);
+        const CrtHit kept = crt_hit_of_slot(&ctx, ray, met.slot, met.instance);
+        wrong += !sameBits(kept, nearest) || (met.count == 0) != (nearest.slot == CRT_NONE);
+        if (nearest.slot == CRT_NONE)
+            ++none;
+        else
+            ++(nearest.instance != 0 ? of_instances : of_others);
+    }
+    CHECK(wrong == 0);
+    CHECK(of_instances > 10000);
+    CHECK(of_others > 300);
+    CHECK(none > 1000);
+}
+
 namespace {
 
 /// A place of a compiled scene, in the author's units.
