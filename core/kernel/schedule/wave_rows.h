@@ -242,7 +242,7 @@ CRT_FN void crt_store_hit(const CrtWave *wave, u32 slot, CrtHit hit) {
                   crt_from_bits(CRT_NONE), 0.0f);
 }
 
-/* What crt_hit_of_slot needs for the hit of a surface that a shadow ray may pass. */
+/* Stores the place of a surface that a shadow ray may pass: crt_hit_of_slot finds its hit. */
 CRT_FN void crt_store_passable(const CrtWave *wave, u32 slot, CrtPassable met) {
     CrtHit hit = crt_no_hit(met.t);
     hit.slot = met.slot;
