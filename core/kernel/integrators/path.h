@@ -49,7 +49,7 @@ CRT_FN int crt_path_advance_passing(const CrtContext *ctx, CrtPath *path, CrtRay
             if (way.shadow && (crt_has_panes(ctx) || !passable)) {
                 CrtPassable met = crt_none_passable(ray.reach);
                 stopped = crt_trace_any(ctx, ray, &met);
-                hit = crt_hit_of_slot(ctx, ray, met.slot, met.instance);
+                if (!stopped) hit = crt_hit_of_slot(ctx, ray, met.slot, met.instance);
                 last = met.count == 1u;
             } else {
                 hit = crt_trace_closest(ctx, ray);

@@ -44,12 +44,12 @@ CRT_FN u32 crt_wave_rows(u64 features) {
     return CRT_ROW_SIDE;
 }
 
-/* A launch: samples from first_sample on of the pixels [x0, x1) × [y0, y1), and where slots are kept. */
+/* A launch: samples of the pixels [x0, x1) × [y0, y1), from first_sample on, and where slots are kept. */
 typedef struct CrtWave {
     u32 x0, y0, x1, y1;
     u64 first_sample;
     u32 slices;           /* each adds to a separate film */
-    u32 slice_samples;    /* of a slice: divided once, and not by each slot */
+    u32 slice_samples;    /* of a slice: the host divides, so that no slot does */
     u32 longer_slices;    /* the first ones, which have one sample more */
     u32 blocks_per_slice;
     u32 slots;            /* slices · blocks_per_slice · CRT_WAVE_BLOCK */
