@@ -18,6 +18,11 @@
                      CRT_FEATURE_SMOOTH_NORMALS | CRT_FEATURE_MIRROR | CRT_FEATURE_CONDUCTOR | \
                      CRT_FEATURE_DIELECTRIC | CRT_FEATURE_DISPERSION | CRT_FEATURE_LENS |      \
                      CRT_FEATURE_ENVIRONMENT))
+/// Untextured surfaces of every kind, without layers on top, seen under lights with a surface.
+#define CRT_EMBREE_GLOSSY_FEATURES                                                                      \
+    ((unsigned long)(CRT_EMBREE_SMOOTH_FEATURES | CRT_FEATURE_ROUGH_CONDUCTOR |                         \
+                     CRT_FEATURE_ROUGH_DIELECTRIC | CRT_FEATURE_THIN_DIELECTRIC | CRT_FEATURE_PLASTIC | \
+                     CRT_FEATURE_MEDIA | CRT_FEATURE_THIN_FILM | CRT_FEATURE_MIX | CRT_FEATURE_ANISOTROPY))
 /// Every scene.
 #define CRT_EMBREE_ALL_FEATURES CRT_FEATURES_ALL
 

@@ -10,15 +10,17 @@ namespace crt::embree {
 RayTotals renderBox(const TileJob& job);
 RayTotals renderMesh(const TileJob& job);
 RayTotals renderSmooth(const TileJob& job);
+RayTotals renderGlossy(const TileJob& job);
 RayTotals renderAll(const TileJob& job);
 
 namespace {
 
 // kernels.cpp is compiled with the same masks. Smallest first.
-constexpr std::array<Program, 4> kPrograms{{
+constexpr std::array<Program, 5> kPrograms{{
     {"box: a handful of diffuse triangles", CRT_EMBREE_BOX_FEATURES, renderBox},
     {"mesh: diffuse meshes", CRT_EMBREE_MESH_FEATURES, renderMesh},
     {"smooth: mirrors, metals and glass", CRT_EMBREE_SMOOTH_FEATURES, renderSmooth},
+    {"glossy: surfaces of every kind, without textures", CRT_EMBREE_GLOSSY_FEATURES, renderGlossy},
     {"all features", CRT_EMBREE_ALL_FEATURES, renderAll},
 }};
 

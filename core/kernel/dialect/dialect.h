@@ -17,7 +17,11 @@
 #pragma OPENCL FP_CONTRACT OFF
 #pragma OPENCL EXTENSION cl_khr_fp64 : enable
 #define CRT_FN static inline
+#if CRT_SIMD8 && CRT_LEAN /* PoCL calls functions of some 100 instructions: a tenth of a render */
+#define CRT_HOT_FN __attribute__((always_inline)) CRT_FN
+#else /* 4 s more to compile a kernel with all features */
 #define CRT_HOT_FN CRT_FN
+#endif
 #define CRT_CALLED_FN __attribute__((noinline)) static
 #define CRT_SHARED_FN CRT_FN
 #define CRT_GLOBAL __global

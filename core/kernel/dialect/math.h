@@ -37,7 +37,7 @@ CRT_HOT_FN vec3 crt_fma3(vec3 v, f32 s, vec3 a) {
 
 /* a·b − c·d with an error of at most 1.5 ulp, by Kahan: exact sign, so an edge shared by two triangles
    is seen alike from both, whatever the compiler contracts (Jeannerod, Louvet, Muller 2013). */
-CRT_FN f32 crt_difference_of_products(f32 a, f32 b, f32 c, f32 d) {
+CRT_HOT_FN f32 crt_difference_of_products(f32 a, f32 b, f32 c, f32 d) {
     const f32 cd = c * d;
     const f32 error = crt_fma(-c, d, cd);
     return crt_fma(a, b, -cd) + error;
@@ -90,7 +90,7 @@ CRT_FN vec3 crt_to_world(CrtFrame f, vec3 v) {
 /* sin(x) and cos(x) for |x| ≤ π/4, minimax polynomials (Cephes sinf, cosf): error at most 0.74 and 0.88
    ulp,
  * over all floats. */
-CRT_FN f32 crt_sin_quarter(f32 x) {
+CRT_HOT_FN f32 crt_sin_quarter(f32 x) {
     const f32 z = x * x;
     return crt_fma(crt_fma(crt_fma(-1.9515295891e-4f, z, 8.3321608736e-3f), z, -1.6666654611e-1f) * z, x, x);
 }
@@ -104,7 +104,7 @@ CRT_FN f32 crt_cos_quarter(f32 x) {
 
 /* sin and cos of any |x| < 64: reduction by multiples of π/2 in three parts (Cody and Waite), absolute
    error < 7.8e-8. */
-CRT_FN f32 crt_sincos(f32 x, f32 *cosine) {
+CRT_HOT_FN f32 crt_sincos(f32 x, f32 *cosine) {
     const f32 q = crt_floor(x * 0.63661977236758134308f + 0.5f);
     f32 r = crt_fma(q, -1.5703125f, x);
     r = crt_fma(q, -4.83751296997070312e-4f, r);
@@ -133,7 +133,7 @@ CRT_FN f32 crt_atan_unit(f32 x) {
 }
 
 /* Angle of (x, y) in (−π, π]; 0 for (0, 0). Error < 4 ulp; the worst of 6e7 pairs, 3.2. */
-CRT_FN f32 crt_atan2(f32 y, f32 x) {
+CRT_HOT_FN f32 crt_atan2(f32 y, f32 x) {
     const f32 ax = crt_abs(x);
     const f32 ay = crt_abs(y);
     const f32 larger = crt_max(ax, ay);

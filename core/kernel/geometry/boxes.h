@@ -92,7 +92,7 @@ CRT_FN CrtNodeRay crt_node_ray(CrtRay ray, f32 slack) {
 
 /* Entry distances into a node's four children; infinity where the ray misses. Boxes that begin beyond
    `limit` by more than rounding are missed. */
-CRT_FN vec4 crt_node_distances(CRT_GLOBAL const CrtNode4 *node, CrtNodeRay ray, f32 limit) {
+CRT_HOT_FN vec4 crt_node_distances(CRT_GLOBAL const CrtNode4 *node, CrtNodeRay ray, f32 limit) {
     CRT_GLOBAL const f32 *planes = &node->bounds[0][0];
 #if CRT_SIMD8
     const u32 near_x = ray.near_x, near_y = ray.near_y, near_z = ray.near_z;
@@ -135,7 +135,8 @@ CRT_FN vec4 crt_node_distances(CRT_GLOBAL const CrtNode4 *node, CrtNodeRay ray, 
 
 /* Of the children that a ray enters at t the nearest becomes `current`; the others go onto the stack, the
    farthest first. 0: it enters none. */
-CRT_FN int crt_enter_nearest(CRT_GLOBAL const CrtNode4 *node, vec4 t, u64 *stack, u32 *size, u32 *current) {
+CRT_HOT_FN int crt_enter_nearest(CRT_GLOBAL const CrtNode4 *node, vec4 t, u64 *stack, u32 *size,
+                                 u32 *current) {
     f32 t0 = V4X(t), t1 = V4Y(t), t2 = V4Z(t), t3 = V4W(t);
     const vec4 child = crt_load4((CRT_GLOBAL const f32 *)node->child); /* in one wide load */
     u32 c0 = crt_bits(V4X(child)), c1 = crt_bits(V4Y(child)), c2 = crt_bits(V4Z(child)),
@@ -155,7 +156,7 @@ CRT_FN int crt_enter_nearest(CRT_GLOBAL const CrtNode4 *node, vec4 t, u64 *stack
 
 /* The next from the stack that may hold a hit at most as far as t: a box that begins just behind the best
    hit may still hold a tie, and the slack keeps it. 0: there is none. */
-CRT_FN int crt_next_stacked(const u64 *stack, u32 *size, f32 t, u32 *current) {
+CRT_HOT_FN int crt_next_stacked(const u64 *stack, u32 *size, f32 t, u32 *current) {
     const f32 limit = t * CRT_SLAB_SLACK;
     while (*size != 0u) {
         --*size;
@@ -169,7 +170,7 @@ CRT_FN int crt_next_stacked(const u64 *stack, u32 *size, f32 t, u32 *current) {
 
 /* One of the children that a ray enters at t becomes `current`; the others go onto the stack, in any order.
    0: it enters none. */
-CRT_FN int crt_enter_any(CRT_GLOBAL const CrtNode4 *node, vec4 t, u32 *stack, u32 *size, u32 *current) {
+CRT_HOT_FN int crt_enter_any(CRT_GLOBAL const CrtNode4 *node, vec4 t, u32 *stack, u32 *size, u32 *current) {
     const vec4 child = crt_load4((CRT_GLOBAL const f32 *)node->child); /* in one wide load */
     u32 next = CRT_NONE;
     if (V4X(t) < CRT_INFINITY) next = crt_bits(V4X(child));

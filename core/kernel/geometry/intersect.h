@@ -56,7 +56,7 @@ CRT_FN CrtShear crt_shear(CrtRay ray) {
    enough off its surface (surface.h) that the sign of t is right, and whatever is really in front, however
    near, must stop it, or light leaks through corners. px: the coordinates of the three corners along axis kx
    of the ray. */
-CRT_FN int crt_intersect_corners(vec3 px, vec3 py, vec3 pz, CrtShear ray, f32 limit, CrtHit *hit) {
+CRT_HOT_FN int crt_intersect_corners(vec3 px, vec3 py, vec3 pz, CrtShear ray, f32 limit, CrtHit *hit) {
     const f32 az = V3X(pz) - ray.oz;
     const f32 bz = V3Y(pz) - ray.oz;
     const f32 cz = V3Z(pz) - ray.oz;
@@ -88,8 +88,8 @@ CRT_FN vec3 crt_choose3(u32 k, vec3 a, vec3 b, vec3 c) {
                      crt_choose(k, V3Z(a), V3Z(b), V3Z(c)));
 }
 
-CRT_FN int crt_intersect_triangle(CRT_GLOBAL const CrtTriangle *triangle, CrtShear ray, f32 limit,
-                                  CrtHit *hit) {
+CRT_HOT_FN int crt_intersect_triangle(CRT_GLOBAL const CrtTriangle *triangle, CrtShear ray, f32 limit,
+                                      CrtHit *hit) {
 #if CRT_SIMD8
     CRT_GLOBAL const f32 *px = triangle->p + 3u * ray.kx;
     CRT_GLOBAL const f32 *py = triangle->p + 3u * ray.ky;
@@ -126,8 +126,8 @@ CRT_FN void crt_keep_nearer(f32 t, f32 b1, f32 b2, u32 slot, u32 id, u32 instanc
 }
 
 /* Tests one slot against the best hit so far. */
-CRT_FN void crt_test_closest(CRT_GLOBAL const CrtTriangle *triangles, u32 slot, CrtShear shear,
-                             CrtHit *best) {
+CRT_HOT_FN void crt_test_closest(CRT_GLOBAL const CrtTriangle *triangles, u32 slot, CrtShear shear,
+                                 CrtHit *best) {
     CrtHit hit;
     if (!crt_intersect_triangle(triangles + slot, shear, crt_tie_limit(best->t), &hit)) return;
     crt_keep_nearer(hit.t, hit.b1, hit.b2, slot, triangles[slot].id, 0u, best);

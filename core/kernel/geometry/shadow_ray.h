@@ -33,7 +33,7 @@ CRT_FN int crt_has_panes(const CrtContext *ctx) { return CRT_SCENE_HAS(ctx->scen
 
 /* In a scene with panes: true if a ray may pass the surface that it meets, or meets a mix. crt_passes
    decides. */
-CRT_FN int crt_may_pass(const CrtContext *ctx, CrtHit hit) {
+CRT_HOT_FN int crt_may_pass(const CrtContext *ctx, CrtHit hit) {
     const u32 material =
         CRT_ARRAY(CrtPrimitive, ctx->blob, ctx->scene->primitives)[crt_primitive_of(ctx, hit)].material;
     if ((CRT_HAS(OPACITY) || CRT_HAS(MIX)) && ctx->scene->compositions.count != 0u) {
@@ -46,7 +46,7 @@ CRT_FN int crt_may_pass(const CrtContext *ctx, CrtHit hit) {
 
 /* Returns 1 if a surface that a shadow ray has hit stops it. The ray hits the surface at most `hits`
    times. */
-CRT_FN int crt_stops(const CrtContext *ctx, CrtHit hit, u32 hits, CrtPassable *passable) {
+CRT_HOT_FN int crt_stops(const CrtContext *ctx, CrtHit hit, u32 hits, CrtPassable *passable) {
     if (!crt_has_panes(ctx)) return 1;
     if (!crt_may_pass(ctx, hit)) return 1;
     if (hit.t < passable->t ||
@@ -60,8 +60,8 @@ CRT_FN int crt_stops(const CrtContext *ctx, CrtHit hit, u32 hits, CrtPassable *p
 }
 
 /* Returns 1 if a triangle stops a shadow ray. */
-CRT_FN int crt_triangle_stops(const CrtContext *ctx, CRT_GLOBAL const CrtTriangle *triangles, u32 slot,
-                              CrtShear shear, f32 reach, CrtPassable *passable) {
+CRT_HOT_FN int crt_triangle_stops(const CrtContext *ctx, CRT_GLOBAL const CrtTriangle *triangles, u32 slot,
+                                  CrtShear shear, f32 reach, CrtPassable *passable) {
     CrtHit hit;
     if (!crt_intersect_triangle(triangles + slot, shear, reach, &hit)) return 0;
     hit.slot = slot;

@@ -13,8 +13,8 @@ CRT_KERNEL_BEGIN
 #define CRT_HAS_SLOTS (CRT_HAS(SHAPES) || CRT_HAS(INSTANCES))
 
 /* crt_test_closest of the triangle, shape or instance in the slot. */
-CRT_FN void crt_test_slot(const CrtContext *ctx, CRT_GLOBAL const CrtTriangle *triangles, u32 slot,
-                          CrtRay ray, CrtShear shear, CrtHit *best) {
+CRT_HOT_FN void crt_test_slot(const CrtContext *ctx, CRT_GLOBAL const CrtTriangle *triangles, u32 slot,
+                              CrtRay ray, CrtShear shear, CrtHit *best) {
     u32 shape = 0u;
     if (CRT_HAS_SLOTS) shape = triangles[slot].shape;
     if (CRT_HAS(INSTANCES) && shape >= CRT_SLOT_INSTANCE)
@@ -26,8 +26,8 @@ CRT_FN void crt_test_slot(const CrtContext *ctx, CRT_GLOBAL const CrtTriangle *t
 }
 
 /* Returns 1 if the slot holds something that stops a shadow ray. */
-CRT_FN int crt_slot_stops(const CrtContext *ctx, CRT_GLOBAL const CrtTriangle *triangles, u32 slot,
-                          CrtRay ray, CrtShear shear, CrtPassable *passable) {
+CRT_HOT_FN int crt_slot_stops(const CrtContext *ctx, CRT_GLOBAL const CrtTriangle *triangles, u32 slot,
+                              CrtRay ray, CrtShear shear, CrtPassable *passable) {
     u32 shape = 0u;
     if (CRT_HAS_SLOTS) shape = triangles[slot].shape;
     if (CRT_HAS(INSTANCES) && shape >= CRT_SLOT_INSTANCE)
@@ -37,7 +37,7 @@ CRT_FN int crt_slot_stops(const CrtContext *ctx, CRT_GLOBAL const CrtTriangle *t
 }
 
 /* The hit of what the slot holds, if `instance` (as of CrtHit) has it. Slot CRT_NONE: none. */
-CRT_FN CrtHit crt_hit_of_slot(const CrtContext *ctx, CrtRay ray, u32 slot, u32 instance) {
+CRT_HOT_FN CrtHit crt_hit_of_slot(const CrtContext *ctx, CrtRay ray, u32 slot, u32 instance) {
     CRT_GLOBAL const CrtTriangle *triangles = CRT_ARRAY(CrtTriangle, ctx->blob, ctx->scene->triangles);
     CrtHit hit = crt_no_hit(ray.reach);
     if (slot == CRT_NONE) return hit;

@@ -198,7 +198,7 @@ CRT_FN vec3 crt_placed_normal(const CrtContext *ctx, u32 instance, vec3 n) {
     return placed / length3(placed);
 }
 
-CRT_FN CrtSurface crt_surface(const CrtContext *ctx, CrtHit hit) {
+CRT_HOT_FN CrtSurface crt_surface(const CrtContext *ctx, CrtHit hit) {
     CRT_GLOBAL const CrtTriangle *triangle =
         CRT_ARRAY(CrtTriangle, ctx->blob, ctx->scene->triangles) + hit.slot;
     if (CRT_HAS(SHAPES) && triangle->shape != 0u)

@@ -44,7 +44,7 @@ typedef struct CrtLightSample {
 
 /* Solid angle of the triangle of the unit vectors a, b, c, given their |a·(b×c)|: tan(Ω/2) = |a·(b×c)|
    / (1 + a·b + b·c + c·a) (Van Oosterom and Strackee 1983); accurate for the smallest triangles. */
-CRT_FN f32 crt_solid_angle(f32 triple, vec3 a, vec3 b, vec3 c) {
+CRT_HOT_FN f32 crt_solid_angle(f32 triple, vec3 a, vec3 b, vec3 c) {
     return 2.0f * crt_atan2(triple, 1.0f + dot3(a, b) + dot3(b, c) + dot3(c, a));
 }
 
@@ -116,7 +116,7 @@ CRT_FN f32 crt_edge_distance2(CrtLightShape s, vec3 p) {
 
 /* By pointer: called twice, it is not inlined, and copies of the shape in wide words wait for its narrow
  * stores. */
-CRT_FN CrtLightView crt_light_view(const CrtLightShape *shape, vec3 p) {
+CRT_HOT_FN CrtLightView crt_light_view(const CrtLightShape *shape, vec3 p) {
     CrtLightView v;
     v.technique = CRT_LIGHT_BY_AREA;
     v.height = dot3(shape->normal, shape->o - p);
@@ -175,7 +175,7 @@ CRT_FN vec3 crt_perpendicular(vec3 v, vec3 n) { return normalize3(v - n * dot3(v
  * α / (1 + tan(ab/2) tan(ax/2) cos α) (1886, § 103) the cut is at tan(ax/2) = sin(w/2) / (tan(ab/2)
  * sin(α − w/2)).
  */
-CRT_FN vec3 crt_sample_spherical_triangle(vec3 a, vec3 b, vec3 c, f32 triple, f32 omega, CrtRandom2 u) {
+CRT_HOT_FN vec3 crt_sample_spherical_triangle(vec3 a, vec3 b, vec3 c, f32 triple, f32 omega, CrtRandom2 u) {
     /* The longest side, which may be nearly half a circle, is the one that is cut: arcs from the corner
      * across from it are shorter. */
     const f32 ab = dot3(a, b), bc = dot3(b, c), ca = dot3(c, a);
@@ -227,7 +227,8 @@ CRT_FN u32 crt_light_choose(const CrtContext *ctx, CrtSampler *sampler, u32 dime
 }
 
 /* The emitter as seen from p. */
-CRT_FN CrtLightView crt_emitter_view(CRT_GLOBAL const CrtLight *light, const CrtLightShape *shape, vec3 p) {
+CRT_HOT_FN CrtLightView crt_emitter_view(CRT_GLOBAL const CrtLight *light, const CrtLightShape *shape,
+                                         vec3 p) {
     CrtLightView view = crt_light_view(shape, p);
     if (CRT_HAS(OPACITY) && (light->flags & CRT_LIGHT_UNSAMPLED) != 0u) view.technique = CRT_LIGHT_BY_CHANCE;
     return view;

@@ -82,7 +82,7 @@ CRT_FN vec4 crt_rough_conductor(const CrtBsdf *b, vec3 wi, f32 *pdf) {
 
 /* One of the normals that w_o sees (Dupuy and Benyoub 2023, "Sampling Visible GGX Normals with Spherical
    Caps"): stretched by α, they are those halfway to a cap of the sphere. */
-CRT_FN vec3 crt_visible_normal(const CrtBsdf *b, CrtRandom2 u) {
+CRT_HOT_FN vec3 crt_visible_normal(const CrtBsdf *b, CrtRandom2 u) {
     const CrtFrame frame = crt_facet_frame(b);
     f32 across = b->alpha;
     if (CRT_HAS(ANISOTROPY) && crt_is_anisotropic(b)) across = b->alpha * b->narrowing;

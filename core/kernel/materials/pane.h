@@ -36,7 +36,7 @@ CRT_FN f32 crt_pane_transmittance_lane(f32 cos_i, f32 eta, int filmed, f32 film_
 }
 
 /* The transmittance of a pane at the path's wavelengths. It is the same in both directions of the light. */
-CRT_FN vec4 crt_pane_transmittance(const CrtBsdf *b, f32 cos_i) {
+CRT_HOT_FN vec4 crt_pane_transmittance(const CrtBsdf *b, f32 cos_i) {
     const int filmed = crt_has_film(b);
     vec4 passed = splat4(0.0f);
     CRT_ROLLED for (u32 lane = 0u; lane < 4u; ++lane) passed = crt_with_lane(

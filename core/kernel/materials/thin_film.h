@@ -63,7 +63,7 @@ CRT_FN f32 crt_airy(f32 before, CrtComplex film, CrtComplex beyond, CrtComplex e
 /* Reflectance of what is polarised across the plane of incidence, and *along of what is in it, at one
    wavelength and cosine of incidence. Indices are relative to the medium before the film: `film` of the
    film, n + ik of what is under it. `rounds`: 2 d n₁ / λ. */
-CRT_FN f32 crt_film_polarised(f32 cos_i, f32 film, f32 rounds, f32 n, f32 k, f32 *along) {
+CRT_HOT_FN f32 crt_film_polarised(f32 cos_i, f32 film, f32 rounds, f32 n, f32 k, f32 *along) {
     *along = 1.0f;
     if (k == 0.0f && !(crt_refraction(cos_i, n) > 0.0f)) return 1.0f;
     /* n cos θ of the media but the first: (n cos θ)² = n² − sin². */
@@ -108,8 +108,8 @@ CRT_FN vec4 crt_film_reflectance(const CrtBsdf *b, f32 cos_i) {
 }
 
 /* Reads the film of a material whose eta and k are set. `before`: index on w_o's side over that outside. */
-CRT_FN void crt_prepare_film(const CrtContext *ctx, CrtBsdf *b, const CrtMaterial *material,
-                             const CrtSurface *surface, vec4 position, vec4 before) {
+CRT_HOT_FN void crt_prepare_film(const CrtContext *ctx, CrtBsdf *b, const CrtMaterial *material,
+                                 const CrtSurface *surface, vec4 position, vec4 before) {
     if (material->film_thickness == 0u) return;
     const f32 thickness_nm =
         V4X(crt_value(ctx, material->film_thickness, surface, position)) * material->film_scale;

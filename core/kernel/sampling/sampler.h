@@ -208,7 +208,9 @@ CRT_FN u32 crt_sample_bits(CrtSampler *s, u32 dimension) {
     return 0u;
 }
 
-CRT_FN f32 crt_sample_1d(CrtSampler *s, u32 dimension) { return crt_unit(crt_sample_bits(s, dimension)); }
+CRT_HOT_FN f32 crt_sample_1d(CrtSampler *s, u32 dimension) {
+    return crt_unit(crt_sample_bits(s, dimension));
+}
 
 /* Two numbers, stratified together: padded pairs of the first two Sobol dimensions, index shuffled and
    values scrambled per (pixel, dimension) (Burley 2020, "Practical Hash-based Owen Scrambling"). */
