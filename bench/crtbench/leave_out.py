@@ -87,7 +87,7 @@ def measure(program, arguments):
 
     def same_image(scene, environment):
         """True if the kernel with the feature more does the same work: it renders the same bits."""
-        images = [program.scratch / f"{scene}-{which}.exr" for which in ("without", "with")]
+        images = [program.scratch / f"{scene}-{which}.pfm" for which in ("without", "with")]
         if not images[0].exists():
             render(scene, timed, "lean-only", [images[0]])
         render(scene, timed, "lean-only", [images[1]], environment=environment)
@@ -99,7 +99,7 @@ def measure(program, arguments):
         data["scenes"][scene] = {"backends": {}}
         for backend in usable:
             images = {
-                kernel: program.scratch / f"{scene}-{backend}-{kernel}.exr" for kernel in ("lean", "full")
+                kernel: program.scratch / f"{scene}-{backend}-{kernel}.pfm" for kernel in ("lean", "full")
             }
             for kernel, image in images.items():
                 render(scene, backend, kernel, [image])
