@@ -18,7 +18,7 @@
                      CRT_FEATURE_SMOOTH_NORMALS | CRT_FEATURE_MIRROR | CRT_FEATURE_CONDUCTOR | \
                      CRT_FEATURE_DIELECTRIC | CRT_FEATURE_DISPERSION | CRT_FEATURE_LENS |      \
                      CRT_FEATURE_ENVIRONMENT))
-/// Untextured surfaces of every kind, without layers on top, seen under lights with a surface.
+/// Metals, glass, panes and plastic of any roughness, untextured, under lights with a surface.
 #define CRT_EMBREE_GLOSSY_FEATURES                                                                      \
     ((unsigned long)(CRT_EMBREE_SMOOTH_FEATURES | CRT_FEATURE_ROUGH_CONDUCTOR |                         \
                      CRT_FEATURE_ROUGH_DIELECTRIC | CRT_FEATURE_THIN_DIELECTRIC | CRT_FEATURE_PLASTIC | \

@@ -20,7 +20,7 @@ constexpr std::array<Program, 5> kPrograms{{
     {"box: a handful of diffuse triangles", CRT_EMBREE_BOX_FEATURES, renderBox},
     {"mesh: diffuse meshes", CRT_EMBREE_MESH_FEATURES, renderMesh},
     {"smooth: mirrors, metals and glass", CRT_EMBREE_SMOOTH_FEATURES, renderSmooth},
-    {"glossy: surfaces of every kind, without textures", CRT_EMBREE_GLOSSY_FEATURES, renderGlossy},
+    {"glossy: metals, glass, panes and plastic of any roughness", CRT_EMBREE_GLOSSY_FEATURES, renderGlossy},
     {"all features", CRT_EMBREE_ALL_FEATURES, renderAll},
 }};
 
