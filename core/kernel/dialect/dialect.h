@@ -17,9 +17,9 @@
 #pragma OPENCL FP_CONTRACT OFF
 #pragma OPENCL EXTENSION cl_khr_fp64 : enable
 #define CRT_FN static inline
-#if CRT_SIMD8 && CRT_LEAN /* PoCL calls functions of some 100 instructions: a tenth of a render */
+#if CRT_SIMD8 && CRT_LEAN /* PoCL would call functions of 100 instructions: a tenth of a render */
 #define CRT_HOT_FN __attribute__((always_inline)) CRT_FN
-#else /* 4 s more to compile a kernel with all features */
+#else /* A kernel with all features would take 4 s more to compile. */
 #define CRT_HOT_FN CRT_FN
 #endif
 #define CRT_CALLED_FN __attribute__((noinline)) static
