@@ -760,8 +760,12 @@ TEST_CASE("the same bits as the portable build of the kernel", "[bits]") {
 
 TEST_CASE("a kernel with everything in it gives the bits of the lean one", "[bits]") {
     bool lean_differs = false;
-    for (const Named& n : allScenes())
+    std::size_t number = 0;
+    for (const Named& n : allScenes()) {
+        // A compiler takes seconds for a kernel without AOVs: every third scene is rendered without.
+        const bool without = number++ % 3 == 0 || n.plain;
         for (const std::uint32_t aovs : {0u, kAllAovs}) {
+            if (aovs == 0 && !without) continue;
             Run lean, full;
             lean.samples = full.samples = 4;
             lean.aovs = full.aovs = aovs;
@@ -778,6 +782,7 @@ TEST_CASE("a kernel with everything in it gives the bits of the lean one", "[bit
             if (n.plain && leanKernels()) CHECK(of_lean.kernel_features != of_full.kernel_features);
             lean_differs = lean_differs || of_lean.kernel_features != of_full.kernel_features;
         }
+    }
     if (!lean_differs)
         WARN("the backend has one kernel for all scenes, so there was nothing to compare it with");
 }

@@ -2,15 +2,17 @@
 // and checks that none spills more than a few registers. Needs no GPU. Prints registers and compile time of
 // each variant.
 //
-//     nvrtc_variants [--arch 90] [--part I N] [--precompiled LOG] [--fewest-blocks] [--only] [SCENE …]
+//     nvrtc_variants [--arch 90] [--part I N] [--precompiled LOG] [--fewest-blocks] [--largest]
+//         [--only] [SCENE …]
 //
 // The masks: everything, each sampler and accelerator, each kind of material, and those of the scenes given,
-// as a render of the file compiles them. --only: those of the scenes that follow, alone. --part: every
-// N-th variant, from the I-th on. --precompiled: the kernel with everything in is judged by what nvcc has
-// written into LOG while the build compiled it, and is not compiled again. --fewest-blocks: each variant is
-// compiled once, with the most registers that a render allows it, instead of as a render does. It fails
-// where a render's fails, because a render takes more blocks only where those spill little. Exit code 77,
-// which ctest shows as skipped, where NVRTC is missing.
+// as a render of the file compiles them. --only: those of the scenes that follow, alone. --part: every N-th
+// variant, from the I-th on. --largest: without the masks whose features a scene's kernel has among others,
+// since that kernel needs more registers and may have no more. --precompiled: the kernel with everything in
+// is judged by what nvcc has written into LOG while the build compiled it, and is not compiled again.
+// --fewest-blocks: each variant is compiled once, with the most registers that a render allows it, instead
+// of as a render does. It fails where a render's fails, because a render takes more blocks only where those
+// spill little. Exit code 77, which ctest shows as skipped, where NVRTC is missing.
 #include "cuda_nvrtc.h"
 #include "cuda_program.h"
 
@@ -25,6 +27,7 @@
 #include "render/outputs.h"
 #include "scene/yaml/scene_yaml.h"
 
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
@@ -119,12 +122,23 @@ void addScene(const crt::CompiledScene& scene, const std::string& name, Variants
     for (const KernelSpec& kernel : crt::gpu::planWave(scene.data()).kernels) add(kernel, name, variants);
 }
 
+KernelSpec specOf(const Variants::value_type& variant) {
+    return {static_cast<Entry>(variant.first.first), variant.first.second};
+}
+
+/// True if `larger` has all of its features, and may have as many registers.
+bool isCoveredBy(const KernelSpec& spec, const KernelSpec& larger) {
+    return spec.entry == larger.entry && (spec.features & ~larger.features) == 0 &&
+           crt::cuda::blocksPerMultiprocessor(spec).back() ==
+               crt::cuda::blocksPerMultiprocessor(larger).back();
+}
+
 int run(int argc, char** argv) {
     int arch = 90, part = 1, parts = 1;
-    bool fewest_blocks = false;
+    bool fewest_blocks = false, largest = false;
     std::string precompiled;
-    Variants variants;
-    for (const auto& [mask, name] : representativeMasks()) addMask(mask, name, variants);
+    Variants masks, variants;
+    for (const auto& [mask, name] : representativeMasks()) addMask(mask, name, masks);
     for (int i = 1; i < argc; ++i) {
         if (std::strcmp(argv[i], "--arch") == 0 && i + 1 < argc) {
             arch = std::atoi(argv[++i]);
@@ -144,13 +158,25 @@ int run(int argc, char** argv) {
             fewest_blocks = true;
             continue;
         }
+        if (std::strcmp(argv[i], "--largest") == 0) {
+            largest = true;
+            continue;
+        }
         if (std::strcmp(argv[i], "--only") == 0) {
+            masks.clear();
             variants.clear();
             continue;
         }
         const crt::Scene scene = crt::loadScene(argv[i]);
         addScene(crt::compileScene(scene, crt::requestedAovs(scene)), argv[i], variants);
     }
+    const auto isCovered = [&](const Variants::value_type& mask) {
+        return std::any_of(variants.begin(), variants.end(), [&](const Variants::value_type& variant) {
+            return isCoveredBy(specOf(mask), specOf(variant));
+        });
+    };
+    if (largest) std::erase_if(masks, isCovered);
+    variants.merge(masks);
 
     const CrtHost host = crt::makeHost(false);
     const char* wavefront_text = host.kernel_source(host.user, "kernel/schedule/wavefront.h");
@@ -176,7 +202,7 @@ int run(int argc, char** argv) {
     int failures = 0, number = 0;
     for (const auto& [key, name] : variants) {
         if (number++ % parts != part - 1) continue;
-        const KernelSpec spec{static_cast<Entry>(key.first), key.second};
+        const KernelSpec spec = specOf({key, name});
         const std::string entry = crt::gpu::entryName(spec.entry);
         const auto start = std::chrono::steady_clock::now();
         const auto compiled = [&] {

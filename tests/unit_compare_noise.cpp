@@ -373,7 +373,7 @@ TEST_CASE("text and JSON of a comparison say what was found and what is not know
     const ReferenceComparison errors = compareWithReference(a, b, reference, false);
     const std::string text = comparisonText({&result, &noise, &errors});
     CHECK_THAT(text, Contains("bias R") && Contains("more than noise") &&
-                         Contains("noise of A        StdError.R, G, B, 15 degrees of freedom a pixel"));
+                         Contains("noise of A        StdError.R, G, B, 15 degrees of freedom per pixel"));
     CHECK_THAT(text, Contains("has its variance subtracted") && Contains("±") &&
                          Contains("Against the reference R"));
     for (std::size_t begin = 0; begin < text.size(); begin = text.find('\n', begin) + 1) {

@@ -126,10 +126,11 @@ std::string slowCasesText(const std::vector<const Case*>& cases, Level asked) {
     Level slowest = asked;
     for (const Case* const c : cases) slowest = std::max(slowest, c->level);
     if (slowest == asked) return "";
-    return fmt::format("level {}, which takes {} in all: {} of these\n", name(slowest),
-                       kTimes[static_cast<std::size_t>(slowest)],
-                       std::count_if(cases.begin(), cases.end(),
-                                     [&](const Case* c) { return c->level == slowest; }));
+    const auto count =
+        std::count_if(cases.begin(), cases.end(), [&](const Case* c) { return c->level == slowest; });
+    return fmt::format(
+        "of level {0}: {1} of {2} cases, at the size of level {3} (all of level {0} takes {4})\n",
+        name(slowest), count, cases.size(), name(asked), kTimes[static_cast<std::size_t>(slowest)]);
 }
 
 void writeWhole(const std::filesystem::path& path, const std::string& text) {

@@ -25,12 +25,14 @@ backend, including those that are not part of crt:
 
 An estimated figure passes if its 99.9 % interval lies within the tolerance and fails if it lies outside. If
 the interval is too wide to decide, the case is inconclusive, which counts as failing. Exit code 7 says that
-something failed. `commit` is the level for every commit. Level `merge` adds {} cases and enlarges others;
-`nightly` enlarges more.
+something failed. Level `commit` runs on every commit of crt. Level `merge` adds {} cases and enlarges
+others; `nightly` enlarges more.
 
-Deviations are relative to the expected value; where that is 0, they are absolute. A tolerance may be
-absolute where the deviation is relative, as in G28 and H13. "–": not measured at this level. "Not
-applicable": the machine or program lacks something that the case needs; `verify.json` has the reason.
+Deviations are relative to the expected value; where that is 0, they are absolute. A row can have several
+answers with different tolerances. Its figure is the largest deviation of any of them, which can exceed the
+smallest tolerance. A tolerance may be absolute where the deviation is relative, as in G28 and H13. "–":
+not measured at this level. "Not applicable": the machine or program lacks something that the case needs;
+`verify.json` has the reason.
 )";
 
 std::string cell(const std::string& text) {

@@ -204,9 +204,10 @@ def measure(program, arguments):
         "crt and Mitsuba 3 agree where their models are the same",
         [f"{renders} renders of each scene by each program, {samples} samples per pixel, separate seeds; "
          f"crt on `{backend}`, Mitsuba {mi.__version__} (`{arguments.variant}`). Images agree when two "
-         f"one-sided "
-         f"tests at 95 % put the ratio of the mean luminances within {MARGIN:.1%} of 1, and no tile of "
-         f"{TILES} × {TILES} differs by more. Different tables of the observer alone cause 0.1 %.",
+         f"one-sided tests at 95 % put the ratio of the mean luminances within {MARGIN:.1%} of 1, and none "
+         f"of {TILES} × {TILES} tiles of the image differs, after that ratio, by more than {MARGIN:.1%} "
+         "and what chance explains at 95 %. The programs have different tables of the observer, which alone "
+         "cause 0.1 %.",
          *notes],
         ["scene", "Mitsuba over crt, mean", "largest difference of a tile", "verdict"],
         [[*row[:3], row[4]] for row in rows],

@@ -16,6 +16,7 @@
 #include <deque>
 #include <filesystem>
 #include <memory>
+#include <sstream>
 #include <system_error>
 #include <utility>
 
@@ -32,9 +33,9 @@ Examples:
   crt scene.yaml --spp 1024 -o a.exr -o a.png         more samples, into these files
   crt scene.yaml --time 30m                           as many samples as 30 minutes allow
   crt scene.yaml --target-error 1%                    as many as it takes for an error of 1 % of the mean
-  crt scene.yaml --resume --spp 4096                  go on where Ctrl-C or a power cut stopped it
+  crt scene.yaml --resume --spp 4096                  continue after Ctrl-C, or from the last checkpoint
   crt scene.yaml --set film.resolution=[256,256] --set integrator.max_depth=4
-  crt info scene.yaml                                 what a scene needs, and what is left out
+  crt info scene.yaml                                 what a scene needs, and what its kernel leaves out
 
 Half of the samples here and half on another machine, then both together:
   crt scene.yaml --samples 0:512 -o a.crtfilm
@@ -50,14 +51,58 @@ In a pipe, with the scene on standard input and the image on standard output ('-
 
 constexpr const char* kExitCodes = R"(
 Exit codes: 0 done, 1 internal error, 2 command line, 3 scene, 4 backend or device not available,
-5 device failed (what there was is saved), 6 output not written, 7 images differ or a case of verify fails,
-128 + n stopped by signal n, such as 130 by Ctrl-C and 143 by kill (image and checkpoint are saved).
+5 the device failed (the samples so far are saved), 6 output not written, 7 images differ or a case of
+verify fails, 128 + n stopped by signal n, such as 130 by Ctrl-C and 143 by kill (image and checkpoint are
+saved).
 )";
+
+constexpr std::size_t kHelpColumns = 108, kHelpTextColumn = 28;
+
+/// The words, in lines of kHelpColumns that begin at column `from`; the first one goes on after `column`.
+std::string wrapped(const std::string& words, std::size_t column, std::size_t from) {
+    std::string text;
+    std::istringstream stream(words);
+    for (std::string word; stream >> word;) {
+        const bool first = column <= from;
+        if (!first && column + 1 + word.size() > kHelpColumns) {
+            text += "\n" + std::string(from, ' ') + word;
+            column = from + word.size();
+        } else {
+            text += (first ? "" : " ") + word;
+            column += (first ? 0 : 1) + word.size();
+        }
+    }
+    return text + "\n";
+}
+
+/// Breaks paragraphs and explanations of options that are too wide for a terminal.
+std::string foldedHelp(const std::string& text) {
+    std::string folded, paragraph;
+    const auto end = [&] {
+        const bool wide = std::any_of(paragraph.begin(), paragraph.end(), [](char c) { return c == '\v'; });
+        std::replace(paragraph.begin(), paragraph.end(), '\v', '\n');
+        folded += wide ? wrapped(paragraph, 0, 0) : paragraph;
+        paragraph.clear();
+    };
+    for (const std::string& line : splitAt(text.substr(0, text.size() - text.ends_with('\n')), '\n')) {
+        const bool wide = line.size() > kHelpColumns, option = wide && line.starts_with("  ");
+        if (!line.empty() && line[0] != ' ') {
+            paragraph += line + (wide ? '\v' : '\n');
+            continue;
+        }
+        end();
+        folded += option ? line.substr(0, kHelpTextColumn) +
+                               wrapped(line.substr(kHelpTextColumn), kHelpTextColumn, kHelpTextColumn)
+                         : line + "\n";
+    }
+    end();
+    return folded;
+}
 
 /// Usage lines as people write them, and on the top page the options of the command that needs no name.
 class HelpFormatter : public CLI::Formatter {
 public:
-    explicit HelpFormatter(const CLI::App* render) : render_(render) { column_width(28); }
+    explicit HelpFormatter(const CLI::App* render) : render_(render) { column_width(kHelpTextColumn); }
 
     std::string make_usage(const CLI::App* app, std::string) const override {
         if (app->get_parent() == nullptr)
@@ -74,13 +119,13 @@ public:
 
     std::string make_help(const CLI::App* app, std::string name, CLI::AppFormatMode mode) const override {
         if (app->get_parent() != nullptr) {
-            return make_usage(app, name) + "\n" + make_description(app) + options(app, mode) +
-                   app->get_footer();
+            return foldedHelp(make_usage(app, name) + "\n" + make_description(app) + options(app, mode) +
+                              app->get_footer());
         }
-        return make_description(app) + "\n" + make_usage(app, name) + make_subcommands(app, mode) +
-               options(render_, mode) +
-               fmt::format("\n  {:<26}print the version, as 'crt version' does\n", "--version") +
-               app->get_footer();
+        return foldedHelp(make_description(app) + "\n" + make_usage(app, name) +
+                          make_subcommands(app, mode) + options(render_, mode) +
+                          fmt::format("\n  {:<26}print the version, as 'crt version' does\n", "--version") +
+                          app->get_footer());
     }
 
 private:
@@ -177,7 +222,7 @@ private:
                 for (const std::string& other : option.excludes) added->excludes(app->get_option(other));
                 for (const std::string& other : option.needs) added->needs(app->get_option(other));
             }
-        CLI::Option* help = app->set_help_flag("-h,--help", "this page");
+        CLI::Option* help = app->set_help_flag("-h,--help", "print this help");
         if (!command.groups.empty()) help->group(command.groups.back().title);
         app->footer(command.notes);
         app->callback([this, &command] { chosen_ = &command; });

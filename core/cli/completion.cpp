@@ -33,7 +33,7 @@ std::vector<Option> optionsOf(const Command& command) {
     std::vector<Option> options;
     for (const OptionGroup& group : command.groups)
         options.insert(options.end(), group.options.begin(), group.options.end());
-    options.push_back({.names = "-h,--help", .placeholder = {}, .help = "this page", .read = {}});
+    options.push_back({.names = "-h,--help", .placeholder = {}, .help = "print this help", .read = {}});
     return options;
 }
 

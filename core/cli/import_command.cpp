@@ -75,7 +75,7 @@ int import(const Request& request) {
 Command importCommand() {
     const auto request = std::make_shared<Request>();
     return {.name = "import",
-            .summary = "write a scene that shows a model (glTF, GLB, OBJ, PLY)",
+            .summary = "convert a model (glTF, GLB, OBJ, PLY) into a scene",
             .arguments = {{.name = "MODEL",
                            .help = "a .glb, .gltf, .obj or .ply file",
                            .read = [request](const std::string& text) { request->model = text; },

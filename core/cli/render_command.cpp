@@ -27,7 +27,7 @@ OptionGroup what(Job& job) {
              [&job](const std::string& text) { job.time_limit_seconds = parseDuration(text, "--time"); }},
         {.names = "--target-error",
          .placeholder = "PERCENT",
-         .help = "stop when the image's error is below, e.g. 1%, with 95 % confidence",
+         .help = "stop when the error is below PERCENT, e.g. 1%, with 95 % confidence",
          .read =
              [&job](const std::string& text) { job.target_error = parseFraction(text, "--target-error"); }},
         {.names = "--samples",
@@ -121,15 +121,16 @@ Command renderCommand() {
                        {"Messages",
                         {{.names = "-v,--verbose",
                           .placeholder = {},
-                          .help = "say more",
+                          .help = "print more details",
                           .read = [](const std::string&) { setLogLevel(LogLevel::Debug); }},
                          {.names = "-q,--quiet",
                           .placeholder = {},
                           .help = "only warnings and errors, no progress",
-                          .read = [state](const std::string&) {
-                              setLogLevel(LogLevel::Warning);
-                              state->progress = ProgressMode::None;
-                          }}}}},
+                          .read =
+                              [state](const std::string&) {
+                                  setLogLevel(LogLevel::Warning);
+                                  state->progress = ProgressMode::None;
+                              }}}}},
             .notes = programExamples(),
             .run = [state](const std::string& typed) {
                 state->job.command = typed;

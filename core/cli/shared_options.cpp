@@ -86,8 +86,9 @@ Option kernelOption(IntegratorOptions& integrator) {
     return {
         .names = "--kernel",
         .placeholder = "KIND",
-        .help = "lean: for this scene only; full: all features; lean-only: waits for the compiler; same "
-                "bits",
+        .help =
+            "lean: the features of this scene (default); full: all features; lean-only: lean, and wait "
+            "until it is compiled",
         .read = [&integrator](const std::string& text) { integrator.kernel = kernelNamed(text).value(); },
         .completion = completeWord(words),
         .choices = words};

@@ -101,17 +101,16 @@ OptionGroup output(Request& to) {
 }
 
 constexpr const char* kVerifyNotes =
-    "\nThe suite checks a backend against physics, geometry and arithmetic: closed forms, "
-    "deterministic quadrature, relations between\n"
-    "images. A case passes, does not apply (with the reason), is "
-    "INCONCLUSIVE (the noise is too large) or\n"
-    "FAILS; the last two make the exit code 7, and the line below suggests a cause. "
-    "docs/stability.md describes every case.\n"
+    "\nThe suite checks a backend against physics, geometry and arithmetic: closed forms, deterministic\n"
+    "quadrature, relations between images. A case passes, does not apply (with the reason), is "
+    "INCONCLUSIVE\n"
+    "(the noise is too large) or FAILS. INCONCLUSIVE and FAIL give exit code 7, and the line below such a\n"
+    "case suggests a cause. Cases that --case names run whatever their level. docs/stability.md describes\n"
+    "every case.\n"
     "\nExamples:\n"
     "  crt verify                                          the level for every commit, on the best "
     "backend\n"
-    "  crt verify --backend opencl --level merge -o out    a few minutes, with out/verify.json and "
-    "out/verify.html\n"
+    "  crt verify --backend opencl --level merge -o out    a quarter of an hour, with out/verify.html\n"
     "  crt verify --case furnace,A03,H                     two cases and a whole group\n"
     "  crt verify --backend mine --plugin-path build       your own backend\n"
     "  crt verify --list --level nightly                   all cases\n";

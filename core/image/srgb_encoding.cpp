@@ -109,7 +109,7 @@ void tellClipped(const std::string& path, const Image& image, const EncodedImage
     const double share =
         static_cast<double>(encoded.clipped_values) / static_cast<double>(encoded.rgb.size());
     const std::string clipped = fmt::format(
-        "'{}': {} of the colour values lie outside what 8 bits can show and were clipped", path,
+        "'{}': {} of the colour values are above white or outside the colour space and were clipped", path,
         percentText(share));
     // Above white are no more pixels than clipped values.
     const double stops = 3 * share > 0.1 ? stopsTooBright(image) : 0;

@@ -275,7 +275,9 @@ int runJob(const Job& job, Watch& watch) {
 
     logInfo("{}", summary(facts, run.film, plan.light_is_missing));
     if (facts.error) tellTarget(facts);
-    if (!facts.outputs.empty()) logInfo("wrote {}", fmt::join(facts.outputs, ", "));
+    if (!facts.outputs.empty())
+        logInfo("wrote {}{}", fmt::join(facts.outputs, ", "),
+                files.report.empty() ? "" : ", and the report " + files.report);
     if (failure.get()) throw *failure.get();
     if (facts.stop == StopReason::Interrupted && run.film.samples.count() == 0)
         logInfo("stopped by {} before all pixels had a sample: there is no image", facts.request.cause);

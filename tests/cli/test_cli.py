@@ -29,11 +29,14 @@ class Help(CliTest):
             "Exit codes:",
         ):
             self.assertIn(word, text)
-        self.assertLess(max(map(len, text.splitlines())), 120)
 
     def test_every_command_has_help(self):
-        for command in ("render", "compare", "merge", "develop", "info", "plugins", "schema"):
-            self.assertIn(f"{command}", self.crt(command, "--help").stdout.splitlines()[0])
+        commands = re.findall(r"^  ([a-z]+)  ", self.crt("--help").stdout, re.MULTILINE)
+        self.assertGreater(len(commands), 15)
+        for command in commands:
+            text = self.crt(command, "--help").stdout
+            self.assertIn(f"{command}", text.splitlines()[0])
+            self.assertLess(max(map(len, text.splitlines())), 110)
 
     def test_version(self):
         self.assertRegex(self.crt("--version").stdout, r"^crt \d+\.\d+\.\d+\n$")
@@ -246,7 +249,7 @@ class Verify(CliTest):
     def test_a_case_of_a_slower_level_is_announced(self):
         verify = self.start("verify", "-b", "example", "--case", "energy-balance")
         try:
-            self.assertIn("level merge, which takes a quarter of an hour in all: 1 of these",
+            self.assertIn("of level merge: 1 of 1 cases, at the size of level commit",
                           verify.stdout.readline())
         finally:
             verify.kill()

@@ -117,7 +117,7 @@ class Comparing(CliTest):
         info = self.crt("info", "a.exr").stdout
         degrees = re.search(r"crt/errorDegreesOfFreedom +(\d+)", info).group(1)
         text = self.crt("compare", "a.exr", "b.exr", expect=7).stdout
-        self.assertIn("Variance.Y, %s degrees of freedom a pixel" % degrees, text)
+        self.assertIn("Variance.Y, %s degrees of freedom per pixel" % degrees, text)
         self.assertNotIn("not stated", text)
 
     def test_backends_that_agree(self):

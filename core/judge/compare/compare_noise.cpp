@@ -327,7 +327,8 @@ void testPixels(NoiseComparison& result, const View& view, double alpha) {
     const double fewest = std::min(view.a.dof, view.b.dof);
     if (fewest < kFewestPixelDof) {
         result.pixels_untested =
-            fmt::format("a variance with {:.3g} degrees of freedom is too uncertain for one pixel", fewest);
+            fmt::format("a variance with {:.3g} degree{} of freedom is too uncertain for one pixel", fewest,
+                        fewest == 1 ? "" : "s");
     } else {
         std::vector<double> p;
         for (std::size_t i = 0; i < view.a.values.size(); ++i) p.push_back(pixelP(view, i));
@@ -338,6 +339,12 @@ void testPixels(NoiseComparison& result, const View& view, double alpha) {
 }
 
 }  // namespace
+
+bool NoiseComparison::anyBeyondNoise() const {
+    return rmsBeyondNoise() || tiles.rejected > 0 || pixels.rejected > 0 ||
+           std::any_of(channels.begin(), channels.end(), [](const auto& c) { return c.beyondNoise(); }) ||
+           std::any_of(colours.begin(), colours.end(), [&](const auto& c) { return beyondNoise(c); });
+}
 
 NoiseComparison compareNoise(const Image& a, const Image& b) {
     NoiseComparison result;

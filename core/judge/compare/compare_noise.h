@@ -63,6 +63,7 @@ struct NoiseComparison {
     double rms_z_p = 1;  ///< That noise makes it so large. Only with stated noise.
 
     double alpha() const { return 1 - confidence; }
+    bool anyBeyondNoise() const;  ///< True if a test of any kind raises an alarm.
     bool rmsBeyondNoise() const { return rms_z_p < alpha(); }
     /// Of three colours any may raise the alarm.
     bool beyondNoise(const ColourShift& colour) const {

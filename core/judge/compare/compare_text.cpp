@@ -132,6 +132,8 @@ void addNoiseLines(Lines& lines, const NoiseComparison& noise, std::uint32_t wid
                               "p {:.2g}): {}",
                               noise.rms_z, noise.rms_z_p,
                               noise.rmsBeyondNoise() ? "more than noise" : "may be noise"));
+    lines.add("result", noise.anyBeyondNoise() ? "the images differ by more than noise"
+                                               : "no difference beyond noise was found");
 }
 
 Json familyJson(const stats::TestFamily& family) {

@@ -92,7 +92,8 @@ bool addStated(NoisyImage& noisy, const Image& image, NoiseOf what) {
         noisy.dof = stated.value_or(kUnstatedDof);
         const std::string channels = what == NoiseOf::Color ? prefix + "R, G, B" : names.front();
         noisy.source =
-            stated ? fmt::format("{}, {:.6g} degrees of freedom a pixel", channels, *stated)
+            stated ? fmt::format("{}, {:.6g} degree{} of freedom per pixel", channels, *stated,
+                                 *stated == 1 ? "" : "s")
                    : fmt::format("{}, degrees of freedom not stated, taken as {}", channels, kUnstatedDof);
         return true;
     }

@@ -45,6 +45,8 @@ const std::vector<ForeignWords>& foreignWords() {
         {{"material/diffuse", "material/mirror", "material/plastic"},
          {"color", "colour", "albedo", "base_color", "diffuse", "kd", "Kd"},
          "its colour is 'reflectance'"},
+        {{"material/conductor"}, {"roughness"}, "a smooth metal has none: write type: rough_conductor"},
+        {{"material/dielectric"}, {"roughness"}, "smooth glass has none: write type: rough_dielectric"},
         {{"emission"},
          {"luminous_flux_lm", "luminous_flux", "lumens", "lm", "luminance", "luminance_cd_m2", "power_w"},
          lumensHint()},
