@@ -144,12 +144,12 @@ std::vector<Case> lightTreeCases() {
         row("E26", "light-tree",
             "Sixty lamps, twenty points and a directional light over a floor: with light sampling, with it "
             "alone, and by chance",
-            "the sum of what each brings", "linearity of light, closed forms", "± 0.4 %", Level::Commit,
+            "the sum over the lights", "linearity of light, closed forms", "± 0.4 %", Level::Commit,
             kManyLamps | CRT_FEATURE_POINT_LIGHT, manyLights),
         row("E27", "light-tree-gloss",
             "Metal, plastic and a Lambertian floor in a room of eighty glowing tiles, with eighty lamps "
             "below the floor; by light sampling, scattered rays and both",
-            "1 of what loses nothing; else the share that is sent on from everywhere",
+            "1 for lossless materials; else their albedo",
             "conservation of energy; Heitz (2014); Kulla and Conty (2017)", "± 0.3 %", Level::Commit,
             kManyLamps | CRT_FEATURE_ROUGH_CONDUCTOR | CRT_FEATURE_PLASTIC, glossUnderMany),
     };

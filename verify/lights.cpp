@@ -439,7 +439,7 @@ std::vector<Case> lightCases() {
             "± 0.2 %, by chance ± 0.5 % (± 1 %); variance ≤ 1.1", Level::Commit,
             kDirectLight | CRT_FEATURE_INDEPENDENT, techniquesAgree),
         row("E13", "hidden-lamps",
-            "A lamp behind a door that is ajar, and one within glass: with and without light sampling",
+            "A lamp behind an almost closed door, and one within glass: with and without light sampling",
             "the same mean", "both are unbiased", "ratio 1 ± 1 %", Level::Merge,
             kDirectLight | CRT_FEATURE_DIELECTRIC, hiddenLamps),
         row("E14", "enormous-pdf", "A lamp of half side 1e-12 at distance 1", "1.2732395447e-24",

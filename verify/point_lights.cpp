@@ -462,7 +462,7 @@ std::vector<Case> pointLightCases() {
         row("E19", "all-lights",
             "Seven lights without a surface, a lamp and a sampled environment over one floor, chosen by "
             "power",
-            "the sum of what each brings", "linearity of light, closed forms", "± 0.3 %", Level::Commit,
+            "the sum over the lights", "linearity of light, closed forms", "± 0.3 %", Level::Commit,
             kLit | CRT_FEATURE_AREA_LIGHT | CRT_FEATURE_ENVIRONMENT | CRT_FEATURE_ENVIRONMENT_LIGHT,
             allTogether),
         row("E24", "ies",

@@ -285,7 +285,7 @@ std::vector<Case> scatteringCases() {
             CRT_FEATURE_DIELECTRIC | CRT_FEATURE_AREA_LIGHT, reciprocity),
         row("G07", "indices",
             "A clear cube of n = 1, 1 + 1e-7, 1.001, 1.5, 2.4, 100, 1000 in a constant environment",
-            "it vanishes; for n = 1 to the bit", "conservation of radiance over n²",
+            "it cannot be seen; for n = 1 to the bit", "conservation of radiance over n²",
             "2e-4 in every pixel; same bits", Level::Commit, sky | CRT_FEATURE_DIELECTRIC, indices),
         row("G08", "extreme-numbers",
             "Random numbers at the ends of their range in every scattering routine", "finite, or rejected",

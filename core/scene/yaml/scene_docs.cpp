@@ -218,18 +218,18 @@ outputs:
 
 - `camera`, `film`, `integrator`, `sampler`, `environment`, `spectra` and `materials` are merged key by key.
   Where two files give the same key, the including file wins over what it includes, and of a list of files
-  the later one wins over the earlier. A value is replaced as a whole: a material is never made of two
-  halves. A value also removes included keys that exclude it: a `fov` removes a `focal_length` with its
+  the later one wins over the earlier. A value is replaced as a whole: crt takes a material from one file
+  only. A value also removes included keys that exclude it: a `fov` removes a `focal_length` with its
   `sensor`.
 - `objects` and `lights` are concatenated: those of the included files come first, in the order of the list.
-- `title`, `unit` and `outputs` are those of the file that wins; two files with different units are an error.
+- `title`, `unit` and `outputs` come from the file that wins. All files of a scene have one unit: it is
+  enough that one file gives it, and two different units are an error.
 - `key: null` removes an included value if `null` is a valid value of the key, such as `environment: null`.
 - A file that several files include counts once. A file that includes itself, directly or through others, is
   an error. Files may be included 16 deep.
 - Relative names of meshes and spectra are looked up in the folder of the file that names them.
 - `--set` changes the merged scene, including the values of included files.
 - Unused spectra and materials of included files cause no warning.
-- A `unit` in an included file holds for the whole scene.
 
 ```yaml
 crt: 1
@@ -241,15 +241,15 @@ objects:
 
 ## Units of the numbers in an image
 
-EXR and PFM files hold radiance in the colour space of the film: XYZ are ∫ L (x̄, ȳ, z̄) dλ / ∫
-ȳ dλ, with L in W·m⁻²·sr⁻¹·nm⁻¹, and RGB are linear in them. So a pixel with Y = 1, such as
-RGB (1, 1, 1), has the luminance 683.002 lm/W · 106.857 nm = 72,983 cd/m², and Y times that is the
-luminance of every pixel. In sRGB Y = 0.2126 R + 0.7152 G + 0.0722 B. EXR files store this number
-as OpenEXR's attribute `whiteLuminance` (`crt info a.exr` prints it), in each of the three
-colour spaces; where `apply_to_float` multiplies the values by 2^ev, it is divided by that. Spectral bins
-are radiance, in W·m⁻²·sr⁻¹·nm⁻¹. The illuminance of a matt surface of reflectance
-ρ is π / ρ times its luminance. PNG and PPM are for screens: exposed, balanced, sRGB-encoded and
-clipped, so they do not hold radiance. The mean luminance in the report (`NAME.report.json`) is in both
+EXR and PFM files hold radiance. A pixel's luminance is 72,983 cd/m² times its Y; in sRGB, Y =
+0.2126 R + 0.7152 G + 0.0722 B. XYZ are ∫ L (x̄, ȳ, z̄) dλ / ∫ ȳ dλ, with L in
+W·m⁻²·sr⁻¹·nm⁻¹, and RGB follow from XYZ by the colour space of the film. So a pixel with Y =
+1, such as RGB (1, 1, 1), has the luminance 683.002 lm/W · 106.857 nm = 72,983 cd/m². EXR
+files store this number as OpenEXR's attribute `whiteLuminance` (`crt info a.exr` prints it);
+where `apply_to_float` multiplies the values by 2^ev, crt divides it by 2^ev. Spectral bins
+are radiance, in W·m⁻²·sr⁻¹·nm⁻¹. The illuminance of a matt surface of reflectance ρ is π / ρ
+times its luminance. PNG and PPM are for screens: exposed, balanced, sRGB-encoded and clipped,
+so they do not hold radiance. The report (`NAME.report.json`) gives the mean luminance in both
 units.
 
 `crt SCENE --expose auto` chooses `exposure_ev` so that the geometric mean of the luminance becomes
@@ -265,8 +265,8 @@ with their sources, `crt data NAME` prints one. The families are
 - `illuminants/…`, `glasses/…`, `metals/…`: what `illuminant`, `glass` and `metal` name. The parts of a
   metal's index are two spectra, `metals/Au/n` and `metals/Au/k`.
 
-Further families are folders of CSV files (`FAMILY/NAME.csv`, with the header that `crt data NAME` prints)
-in a folder of `CRT_DATA_PATH`, whose folders, separated by `:`, are searched before those of crt.
+You can add families: folders of CSV files (`FAMILY/NAME.csv`, with the header that `crt data NAME` prints).
+`CRT_DATA_PATH` lists the folders that hold them, separated by `:`. crt searches these before its own.
 )";
 
 /// The text before the variants of a family.
