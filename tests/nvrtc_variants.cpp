@@ -8,11 +8,11 @@
 // The masks: everything, each sampler and accelerator, each kind of material, and those of the scenes given,
 // as a render of the file compiles them. --only: those of the scenes that follow, alone. --part: every N-th
 // variant, from the I-th on. --largest: without the masks whose features a scene's kernel has among others,
-// since that kernel needs more registers and may have no more. --precompiled: the kernel with everything in
-// is judged by what nvcc has written into LOG while the build compiled it, and is not compiled again.
-// --fewest-blocks: each variant is compiled once, with the most registers that a render allows it, instead
-// of as a render does. It fails where a render's fails, because a render takes more blocks only where those
-// spill little. Exit code 77, which ctest shows as skipped, where NVRTC is missing.
+// because that kernel needs at least as many registers and may use no more. --precompiled: the kernel with
+// everything in is judged by what nvcc has written into LOG while the build compiled it, and is not compiled
+// again. --fewest-blocks: each variant is compiled once, with the most registers that a render allows it,
+// instead of as a render does. It fails where a render's fails, because a render takes more blocks only
+// where those spill little. Exit code 77, which ctest shows as skipped, where NVRTC is missing.
 #include "cuda_nvrtc.h"
 #include "cuda_program.h"
 

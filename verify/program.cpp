@@ -128,9 +128,12 @@ std::string slowCasesText(const std::vector<const Case*>& cases, Level asked) {
     if (slowest == asked) return "";
     const auto count =
         std::count_if(cases.begin(), cases.end(), [&](const Case* c) { return c->level == slowest; });
+    const bool one = count == 1;
     return fmt::format(
-        "of level {0}: {1} of {2} cases, at the size of level {3} (all of level {0} takes {4})\n",
-        name(slowest), count, cases.size(), name(asked), kTimes[static_cast<std::size_t>(slowest)]);
+        "{1} of {2} cases {5} of level {0}; crt runs {6} at the size of level {3} "
+        "(all of level {0} takes {4})\n",
+        name(slowest), count, cases.size(), name(asked), kTimes[static_cast<std::size_t>(slowest)],
+        one ? "is" : "are", one ? "it" : "them");
 }
 
 void writeWhole(const std::filesystem::path& path, const std::string& text) {

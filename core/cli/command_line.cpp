@@ -58,44 +58,49 @@ saved).
 
 constexpr std::size_t kHelpColumns = 108, kHelpTextColumn = 28;
 
-/// The words, in lines of kHelpColumns that begin at column `from`; the first one goes on after `column`.
-std::string wrapped(const std::string& words, std::size_t column, std::size_t from) {
+/// Breaks words into lines of kHelpColumns. All lines but the first are indented to column `from`, where the
+/// first one begins.
+std::string wrapped(const std::string& words, std::size_t from) {
     std::string text;
+    std::size_t column = from;
     std::istringstream stream(words);
-    for (std::string word; stream >> word;) {
-        const bool first = column <= from;
-        if (!first && column + 1 + word.size() > kHelpColumns) {
-            text += "\n" + std::string(from, ' ') + word;
-            column = from + word.size();
-        } else {
-            text += (first ? "" : " ") + word;
-            column += (first ? 0 : 1) + word.size();
+    for (std::string word; stream >> word; column += word.size()) {
+        if (column > from && column + 1 + word.size() > kHelpColumns) {
+            text += "\n" + std::string(from, ' ');
+            column = from;
+        } else if (column > from) {
+            text += " ";
+            ++column;
         }
+        text += word;
     }
     return text + "\n";
 }
 
-/// Breaks paragraphs and explanations of options that are too wide for a terminal.
+/// Breaks paragraphs and explanations of options that are too wide for a terminal. Indented lines are
+/// options, whose explanation begins at kHelpTextColumn, or examples, which are narrow enough.
 std::string foldedHelp(const std::string& text) {
     std::string folded, paragraph;
-    const auto end = [&] {
-        const bool wide = std::any_of(paragraph.begin(), paragraph.end(), [](char c) { return c == '\v'; });
-        std::replace(paragraph.begin(), paragraph.end(), '\v', '\n');
-        folded += wide ? wrapped(paragraph, 0, 0) : paragraph;
+    bool too_wide = false;
+    const auto endParagraph = [&] {
+        folded += too_wide ? wrapped(paragraph, 0) : paragraph;
         paragraph.clear();
+        too_wide = false;
     };
-    for (const std::string& line : splitAt(text.substr(0, text.size() - text.ends_with('\n')), '\n')) {
-        const bool wide = line.size() > kHelpColumns, option = wide && line.starts_with("  ");
+    std::istringstream lines(text);
+    for (std::string line; std::getline(lines, line);) {
+        const bool is_wide = line.size() > kHelpColumns;
         if (!line.empty() && line[0] != ' ') {
-            paragraph += line + (wide ? '\v' : '\n');
+            paragraph += line + "\n";
+            too_wide = too_wide || is_wide;
             continue;
         }
-        end();
-        folded += option ? line.substr(0, kHelpTextColumn) +
-                               wrapped(line.substr(kHelpTextColumn), kHelpTextColumn, kHelpTextColumn)
-                         : line + "\n";
+        endParagraph();
+        folded += is_wide ? line.substr(0, kHelpTextColumn) +
+                                wrapped(line.substr(kHelpTextColumn), kHelpTextColumn)
+                          : line + "\n";
     }
-    end();
+    endParagraph();
     return folded;
 }
 

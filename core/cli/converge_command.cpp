@@ -36,9 +36,8 @@ OptionGroup what(State& state) {
          .completion = {Completion::Kind::Backend}},
         {.names = "--vary",
          .placeholder = "KEY=A,B",
-         .help = "each value, and each combination: sampler, replicates, nee, roulette, depth, accelerator, "
-                 "filter,\n"
-                 "or any key of the scene; repeatable",
+         .help = "measure the scene with each value of KEY; several --vary give all combinations. KEY is "
+                 "sampler, replicates, nee, roulette, depth, accelerator, filter or any key of the scene",
          .read = [&request](const std::string& text) { request.vary.push_back(converge::parseVary(text)); },
          .repeatable = true},
         {.names = "--reference",
@@ -100,7 +99,7 @@ constexpr const char* kConvergeNotes =
             "docs/error.md explains the terms. Python makes the page, with jinja2 and matplotlib; "
             "'python -m crt report DIR' does it later.\n"
             "\nExamples:\n"
-            "  crt converge configs/cornell_box.yaml --backends embree,opencl --time 60 -o converge_box\n"
+            "  crt converge configs/cornell_box.yaml --backends embree,opencl --time 60s -o converge_box\n"
             "  crt converge scene.yaml --vary sampler=sobol,independent --vary nee=true,false --reference "
             "ref.exr\n"
             "  crt converge configs/analytic/direct_light.yaml --reference 0.2394564705\n"

@@ -126,11 +126,10 @@ Command renderCommand() {
                          {.names = "-q,--quiet",
                           .placeholder = {},
                           .help = "only warnings and errors, no progress",
-                          .read =
-                              [state](const std::string&) {
-                                  setLogLevel(LogLevel::Warning);
-                                  state->progress = ProgressMode::None;
-                              }}}}},
+                          .read = [state](const std::string&) {
+                              setLogLevel(LogLevel::Warning);
+                              state->progress = ProgressMode::None;
+                          }}}}},
             .notes = programExamples(),
             .run = [state](const std::string& typed) {
                 state->job.command = typed;

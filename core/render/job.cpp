@@ -271,13 +271,14 @@ int runJob(const Job& job, Watch& watch) {
                       : facts.stop == StopReason::Interrupted ? facts.request.exit_code
                                                               : 0;
     if (!files.report.empty())
-        failure.attempt([&] { writeReport(files.report, reportJson(scene, *run.compiled, facts)); });
+        failure.attempt([&] {
+            writeReport(files.report, reportJson(scene, *run.compiled, facts));
+            facts.outputs.push_back(files.report);
+        });
 
     logInfo("{}", summary(facts, run.film, plan.light_is_missing));
     if (facts.error) tellTarget(facts);
-    if (!facts.outputs.empty())
-        logInfo("wrote {}{}", fmt::join(facts.outputs, ", "),
-                files.report.empty() ? "" : ", and the report " + files.report);
+    if (!facts.outputs.empty()) logInfo("wrote {}", fmt::join(facts.outputs, ", "));
     if (failure.get()) throw *failure.get();
     if (facts.stop == StopReason::Interrupted && run.film.samples.count() == 0)
         logInfo("stopped by {} before all pixels had a sample: there is no image", facts.request.cause);

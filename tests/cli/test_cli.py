@@ -249,7 +249,7 @@ class Verify(CliTest):
     def test_a_case_of_a_slower_level_is_announced(self):
         verify = self.start("verify", "-b", "example", "--case", "energy-balance")
         try:
-            self.assertIn("of level merge: 1 of 1 cases, at the size of level commit",
+            self.assertIn("1 of 1 cases is of level merge; crt runs it at the size of level commit",
                           verify.stdout.readline())
         finally:
             verify.kill()
