@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include <unistd.h>
+#include <zstd.h>
 
 #include <algorithm>
 #include <cstdlib>
@@ -26,12 +27,22 @@ constexpr std::string_view kRoot = "kernel/";
 
 using TextOf = std::function<std::optional<std::string>(const std::string&)>;
 
+/// All embedded headers, one after the other.
+std::string unpackedKernels() {
+    const KernelFile& last = kKernelFiles[kKernelFileCount - 1];
+    std::string all(last.begin + last.size, '\0');
+    const std::size_t size = ZSTD_decompress(all.data(), all.size(), kPackedKernels, kPackedKernelsSize);
+    if (size != all.size()) throw Error(ErrorKind::Internal, "zstd cannot unpack the embedded kernels");
+    return all;
+}
+
 std::optional<std::string> embeddedText(const std::string& name) {
     const KernelFile* end = kKernelFiles + kKernelFileCount;
     const KernelFile* found =
         std::find_if(kKernelFiles, end, [&](const KernelFile& file) { return name == file.name; });
     if (found == end) return std::nullopt;
-    return found->text;
+    static const auto* const all = new std::string(unpackedKernels());
+    return all->substr(found->begin, found->size);
 }
 
 std::optional<std::string> textIn(const std::string& directory, const std::string& name) {

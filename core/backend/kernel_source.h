@@ -13,11 +13,14 @@ namespace crt {
 
 /// One embedded header.
 struct KernelFile {
-    const char* name;  ///< As it is included: "kernel/geometry/ray.h".
-    const char* text;
+    const char* name;         ///< As it is included: "kernel/geometry/ray.h".
+    std::size_t begin, size;  ///< Its bytes among those of all headers.
 };
 extern const KernelFile kKernelFiles[];
 extern const std::size_t kKernelFileCount;
+/// The bytes of all headers, one after the other, packed by zstd.
+extern const unsigned char kPackedKernels[];
+extern const std::size_t kPackedKernelsSize;
 
 /// Text of a kernel header ("kernel/schedule/wavefront.h") with its quoted includes expanded, or null when
 /// there is none of that name. Lives as long as the process. Throws crt::Error(Internal) when an include
