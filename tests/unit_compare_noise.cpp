@@ -162,6 +162,7 @@ TEST_CASE("a bias is found: in the mean, in a tile, in a pixel", "[compare-noise
     CHECK_FALSE(mean.channels[2].interval.contains(0));
     CHECK(mean.channels[2].interval.contains(0.09));
     CHECK(mean.channels[2].p < 1e-6);
+    CHECK(mean.anyBeyondNoise());
 
     Image tile = withStandardError(3);
     for (std::uint32_t y = 8; y < 16; ++y)
@@ -171,12 +172,14 @@ TEST_CASE("a bias is found: in the mean, in a tile, in a pixel", "[compare-noise
     CHECK(in_tile.tiles.rejected == 1);
     CHECK(in_tile.tiles.worst == (1 * 5 + 2) * 3 + 1);
     CHECK(in_tile.channels[1].interval.contains(0));
+    CHECK(in_tile.anyBeyondNoise());
 
     Image pixel = withStandardError(4);
     pixel.pixels[(7 * kWidth + 9) * 6] += 4;
     const NoiseComparison in_pixel = compareNoise(pixel, b);
     CHECK(in_pixel.pixels.rejected == 1);
     CHECK(in_pixel.pixels.worst / 3 == 7 * kWidth + 9);
+    CHECK(in_pixel.anyBeyondNoise());
     CHECK(in_pixel.z[(7 * kWidth + 9) * 3] > 10);
     const Image map = zMap(in_pixel, kWidth, kHeight);
     const auto color = map.pixels.begin() + (7 * kWidth + 9) * 3;
@@ -184,8 +187,10 @@ TEST_CASE("a bias is found: in the mean, in a tile, in a pixel", "[compare-noise
 }
 
 TEST_CASE("standard errors that are stated too small are seen in z", "[compare-noise]") {
-    CHECK(compareNoise(withStandardError(1, 1, kNoise / 2), withStandardError(2, 1, kNoise / 2)).rms_z ==
-          Approx(2).margin(0.1));
+    const NoiseComparison n =
+        compareNoise(withStandardError(1, 1, kNoise / 2), withStandardError(2, 1, kNoise / 2));
+    CHECK(n.rms_z == Approx(2).margin(0.1));
+    CHECK(n.anyBeyondNoise());
 }
 
 TEST_CASE("images of one seed, and without noise, are not judged, and one that knows its noise is enough",
@@ -208,8 +213,19 @@ TEST_CASE("words, figures and JSON of a noise comparison agree in every branch",
     const auto said = [](const Image& a, const Image& b) {
         const CompareResult result = compareImages(a, b);
         const NoiseComparison noise = compareNoise(a, b);
-        return std::pair{comparisonText({&result, &noise, nullptr}),
-                         nlohmann::json::parse(comparisonJson({&result, &noise, nullptr}))["noise"]};
+        const std::string text = comparisonText({&result, &noise, nullptr});
+        const auto json = nlohmann::json::parse(comparisonJson({&result, &noise, nullptr}))["noise"];
+        if (!json.contains("unknown")) {  // The result is that of all tests together.
+            const auto beyond = [](const auto& row) { return row["beyond_noise"].template get<bool>(); };
+            const auto rejected = [&](const char* tests) { return json[tests].value("rejected", 0) > 0; };
+            const bool any = json["rms_z_beyond_noise"].get<bool>() || rejected("tiles") ||
+                             rejected("pixels") ||
+                             std::any_of(json["bias"].begin(), json["bias"].end(), beyond) ||
+                             std::any_of(json["colour"].begin(), json["colour"].end(), beyond);
+            CHECK_THAT(text, Contains(any ? "the images differ by more than noise"
+                                          : "no difference beyond noise was found"));
+        }
+        return std::pair{text, json};
     };
     const auto withMetadata = [](Image image, const char* key, const char* value) {
         for (auto& [name, text] : image.metadata)

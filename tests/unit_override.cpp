@@ -152,6 +152,10 @@ TEST_CASE("words of other programs are told crt's", "[hints][refused]") {
     CHECK_THAT(refused("materials: {m: {type: glass, ior: 1.5}}\n"), Contains("did you mean 'dielectric'?"));
     CHECK_THAT(refused("materials: {m: {type: diffuse, color: 0.5}}\n"),
                Contains("its colour is 'reflectance'"));
+    CHECK_THAT(refused("materials: {m: {type: conductor, metal: Au, roughness: 0.3}}\n"),
+               Contains("write type: rough_conductor"));
+    CHECK_THAT(refused("materials: {m: {type: dielectric, ior: 1.5, roughness: 0.3}}\n"),
+               Contains("write type: rough_dielectric"));
     const auto lumens = refused(
         "materials: {m: {type: diffuse, reflectance: 0}}\n"
         "objects:\n  - {material: m, mesh: " +

@@ -40,9 +40,10 @@ class Rendering(CliTest):
         self.assertEqual(read_bytes(self.path("a.pfm")), read_bytes(self.path("b.pfm")))
 
     def test_default_outputs(self):
-        self.crt("scene.yaml", "-b", "fake")
+        written = self.crt("scene.yaml", "-b", "fake").stderr.split("wrote ")[1]
         for name in ("scene.exr", "scene.png", "scene.report.json"):
             self.assertTrue(os.path.exists(self.path(name)), name)
+            self.assertIn(name, written)
         self.assertFalse(os.path.exists(self.path("scene.crtfilm")))
 
     def test_outputs_of_the_scene(self):
