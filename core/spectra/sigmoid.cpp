@@ -1,20 +1,18 @@
 #include "spectra/sigmoid.h"
 
+#include "base/for_avx2.h"
+
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 namespace crt {
 namespace {
 
-/// ½ + x / (2√(1+x²)), written so that dark colours (x ≪ 0) do not cancel.
-double sigmoid(double x) {
-    const double h = std::sqrt(1.0 + x * x);
-    return x < 0.0 ? 0.5 / (h * (h - x)) : 0.5 + 0.5 * x / h;
-}
-
-double sigmoidSlope(double x) {
-    const double h2 = 1.0 + x * x;
-    return 0.5 / (h2 * std::sqrt(h2));
+/// ½ + x / (2√(1+x²)), where h is √(1+x²). Written so that dark colours (x ≪ 0) do not cancel.
+double sigmoid(double x, double h) {
+    const double dark = 0.5 / (h * (h - x)), bright = 0.5 + 0.5 * x / h;
+    return x < 0.0 ? dark : bright;
 }
 
 /// The place where the sigmoid is `y`.
@@ -26,21 +24,50 @@ struct Residual {
     double norm2 = 0.0;
 };
 
-Residual evaluate(const Vec3d& c, const Vec3d& rgb, std::span<const SigmoidNode> nodes) {
-    Residual r;
-    for (const auto& [t, weight] : nodes) {
-        const double x = c[0] + t * (c[1] + t * c[2]);
-        const double value = sigmoid(x), slope = sigmoidSlope(x);
-        for (std::size_t k = 0; k < 3; ++k) {
-            const double w = weight[k];
-            r.difference[k] += w * value;
-            r.jacobian[k][0] += w * slope;
-            r.jacobian[k][1] += w * slope * t;
-            r.jacobian[k][2] += w * slope * t * t;
+using Lanes = double __attribute__((vector_size(32)));
+
+/// Sums over nodes, of the channels in the last three lanes: of the weights times the sigmoid, times its
+/// slope, and times the slope and t and t².
+struct Sums {
+    Lanes value{}, slope{}, slope_t{}, slope_tt{};
+};
+
+/// Several nodes are computed at a time, then the channels of each: every sum keeps its order, and so its
+/// bits.
+CRT_FOR_AVX2_TOO void addNodes(const Vec3d& c, std::span<const SigmoidNode> nodes, Sums& sums) {
+    constexpr std::size_t kBlock = 64;
+    double values[kBlock], slopes[kBlock];
+    Sums s = sums;
+    for (std::size_t first = 0; first < nodes.size(); first += kBlock) {
+        const std::size_t count = std::min(kBlock, nodes.size() - first);
+        const SigmoidNode* const block = nodes.data() + first;
+        for (std::size_t i = 0; i < count; ++i) {
+            const double t = block[i].t, x = c[0] + t * (c[1] + t * c[2]);
+            const double h2 = 1.0 + x * x, h = std::sqrt(h2);
+            values[i] = sigmoid(x, h);
+            slopes[i] = 0.5 / (h2 * h);
+        }
+        for (std::size_t i = 0; i < count; ++i) {
+            static_assert(sizeof(SigmoidNode) == sizeof(Lanes));
+            Lanes weights;  // The first lane is t.
+            std::memcpy(&weights, &block[i], sizeof weights);
+            const Lanes slope = weights * slopes[i], slope_t = slope * block[i].t;
+            s.value += weights * values[i];
+            s.slope += slope;
+            s.slope_t += slope_t;
+            s.slope_tt += slope_t * block[i].t;
         }
     }
+    sums = s;
+}
+
+Residual evaluate(const Vec3d& c, const Vec3d& rgb, std::span<const SigmoidNode> nodes) {
+    Sums sums;
+    addNodes(c, nodes, sums);
+    Residual r;
     for (std::size_t k = 0; k < 3; ++k) {
-        r.difference[k] -= rgb[k];
+        r.difference[k] = sums.value[k + 1] - rgb[k];
+        r.jacobian[k] = {sums.slope[k + 1], sums.slope_t[k + 1], sums.slope_tt[k + 1]};
         r.norm2 += r.difference[k] * r.difference[k];
     }
     return r;
@@ -78,7 +105,8 @@ Spectrum sigmoidSpectrum(const Vec3d& c) {
     Spectrum s;
     for (std::size_t i = 0; i < s.values.size(); ++i) {
         const double t = sigmoidWavelength(static_cast<double>(i));
-        s[i] = sigmoid(c[0] + t * (c[1] + t * c[2]));
+        const double x = c[0] + t * (c[1] + t * c[2]);
+        s[i] = sigmoid(x, std::sqrt(1.0 + x * x));
     }
     return s;
 }
