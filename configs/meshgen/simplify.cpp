@@ -97,7 +97,6 @@ private:
         double cost;
         std::uint32_t a, b;
         std::uint32_t version_a, version_b;
-        Vec to;
         /// For a heap with the cheapest on top; ties go by number, so that every run takes the same way.
         bool operator<(const Edge& o) const {
             if (cost != o.cost) return cost > o.cost;
@@ -115,14 +114,17 @@ private:
         return result;
     }
 
-    void push(std::uint32_t a, std::uint32_t b) {
-        const Quadric q = quadric_[a] + quadric_[b];
-        const Vec pa = mesh_.positions[a], pb = mesh_.positions[b];
-        Vec to = mix(pa, pb, 0.5);
+    /// Where an edge becomes one vertex, by the quadric of both ends.
+    Vec placeOf(const Quadric& q, std::uint32_t a, std::uint32_t b) const {
+        const Vec pa = mesh_.positions[a], pb = mesh_.positions[b], middle = mix(pa, pb, 0.5);
         Vec best;
         // Far from the edge the least error is that of an ill-conditioned system, not of a better shape.
-        if (q.best(best) && length(best - to) < 2.0 * length(pb - pa)) to = best;
-        heap_.push({std::max(q.error(to), 0.0), a, b, version_[a], version_[b], to});
+        return q.best(best) && length(best - middle) < 2.0 * length(pb - pa) ? best : middle;
+    }
+
+    void push(std::uint32_t a, std::uint32_t b) {
+        const Quadric q = quadric_[a] + quadric_[b];
+        heap_.push({std::max(q.error(placeOf(q, a, b)), 0.0), a, b, version_[a], version_[b]});
     }
 
     /// Twice the area over the squared longest edge, 0.87 for an equilateral triangle.
@@ -168,7 +170,7 @@ private:
             if (faces_of_[v].size() <= 3) return false;
         // Where the best point would spoil a face, the middle or one of the ends may not.
         const Vec pa = mesh_.positions[a], pb = mesh_.positions[b];
-        const std::array<Vec, 4> choices{edge.to, mix(pa, pb, 0.5), pa, pb};
+        const std::array<Vec, 4> choices{placeOf(quadric_[a] + quadric_[b], a, b), mix(pa, pb, 0.5), pa, pb};
         const auto to = std::find_if(choices.begin(), choices.end(),
                                      [&](Vec p) { return facesSurvive(a, b, p) && facesSurvive(b, a, p); });
         if (to == choices.end()) return false;
