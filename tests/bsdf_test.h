@@ -3,6 +3,7 @@
 #pragma once
 
 #include "kernel_test.h"
+#include "quadrature.h"
 #include "verify/references.h"
 
 #include <algorithm>
@@ -13,12 +14,8 @@
 
 namespace bsdf_test {
 
-using namespace kernel_test;
 using crt::Material;
 using crt::MaterialType;
-using crt::Vec3d;
-
-constexpr double kPi = 3.14159265358979323846;
 
 inline double lane(vec4 v, u32 i) { return i == 0 ? V4X(v) : i == 1 ? V4Y(v) : i == 2 ? V4Z(v) : V4W(v); }
 
@@ -143,7 +140,6 @@ struct Subject {
     bool reciprocal = true;
     /// True if the remaining light depends on its direction.
     bool tinted = false;
-    u32 numbers = 512;  ///< The square of this number makes its means: more where weights differ much.
 };
 
 /// All that the tests ask of, one line each.
@@ -239,13 +235,12 @@ inline std::vector<Subject> subjects() {
         {"white brushed metal by its colours", brushed(colored(1, 1, 1, 0.8), 0.7), constant(1)},
         {"glossy", glossy(0.6, 0.5), of_gloss(0.6, 0.5)},
         {"clay", clay(plastic(0.7, 0, 1), 0.6),
-         [](double cosine) { return crt::verify::eonAlbedo(std::abs(cosine), 0.7, 0.6); }, none, true, false,
-         2048},
-        {"white clay", clay(plastic(1, 0, 1), 1), constant(1), none, true, false, 2048},
+         [](double cosine) { return crt::verify::eonAlbedo(std::abs(cosine), 0.7, 0.6); }},
+        {"white clay", clay(plastic(1, 0, 1), 1), constant(1)},
         {"nearly smooth white clay", clay(plastic(1, 0, 1), 2e-6), constant(1)},
         {"glazed clay", clay(glossy(0.6, 0), 0.8),
          [](double cosine) { return crt::verify::glossyEonAlbedo(std::abs(cosine), 0.6, 0.8, 1.5); }, coat},
-        {"white clay under satin", clay(glossy(1, 0.5), 1), constant(1), none, true, false, 2048},
+        {"white clay under satin", clay(glossy(1, 0.5), 1), constant(1)},
         {"white fuzz on white", fuzzy(reflecting(MaterialType::Diffuse, 1), 1, 1, 0.5), constant(1), none,
          false},
         {"dust on a mirror", fuzzy(reflecting(MaterialType::Mirror, 0.9), 0.5, 0.7, 1), on_mirror, mirrored,
@@ -272,8 +267,7 @@ inline std::vector<Subject> subjects() {
          lacquered(brushed(colored(1, 1, 1, 0.8), 0.7), satin), constant(1), none, false},
         {"satin lacquer on plastic", lacquered(glossy(1, 0), satin), constant(1),
          [=](double cosine) { return (1 - satin.mirrored(std::abs(cosine))) * coat(cosine); }, false},
-        {"satin lacquer on clay", lacquered(clay(plastic(1, 0, 1), 1), satin), constant(1), none, false,
-         false, 2048},
+        {"satin lacquer on clay", lacquered(clay(plastic(1, 0, 1), 1), satin), constant(1), none, false},
         {"white fuzz on lacquer on white",
          fuzzy(lacquered(reflecting(MaterialType::Diffuse, 1), clear), 0.5, 1, 0.6), constant(1),
          on_white_fuzz, false},
@@ -357,11 +351,6 @@ private:
     CrtSurface surface_{};
 };
 
-inline Vec3d spherical(double cosine, double phi) {
-    const double sine = std::sqrt(std::max(0.0, 1 - cosine * cosine));
-    return {sine * std::cos(phi), sine * std::sin(phi), cosine};
-}
-
 /// Directions of view, from both sides of the surface.
 inline std::vector<Vec3d> views() {
     std::vector<Vec3d> all;
@@ -383,60 +372,5 @@ inline double chanceOfSingle(const CrtBsdf& b) {
 }
 
 inline bool isDelta(const CrtBsdf& bsdf) { return crt_is_delta(&bsdf) != 0; }
-
-/// Integrals over cells of the sphere, equal in solid angle: cosine by azimuth.
-constexpr std::size_t kRows = 32, kColumns = 32, kCells = kRows * kColumns, kSteps = 24;
-constexpr std::size_t kSubRows = kRows * kSteps, kSubColumns = kColumns * kSteps;
-/// The directions of the quadrature, row by row: most of its time would be their sines.
-inline const std::vector<Vec3d>& cellDirections() {
-    static const std::vector<Vec3d> all = [] {
-        std::vector<Vec3d> directions;
-        for (std::size_t i = 0; i < kSubRows; ++i)
-            for (std::size_t j = 0; j < kSubColumns; ++j)
-                directions.push_back(
-                    spherical(-1 + 2 * (static_cast<double>(i) + 0.5) / kSubRows,
-                              -kPi + 2 * kPi * (static_cast<double>(j) + 0.5) / kSubColumns));
-        return directions;
-    }();
-    return all;
-}
-template <class F>
-std::array<double, kCells> overCells(const F& f) {
-    std::array<double, kCells> cells{};
-    const std::vector<Vec3d>& directions = cellDirections();
-    for (std::size_t i = 0; i < kSubRows; ++i)
-        for (std::size_t j = 0; j < kSubColumns; ++j)
-            cells[i / kSteps * kColumns + j / kSteps] +=
-                f(directions[i * kSubColumns + j]) * 4 * kPi / (static_cast<double>(kSubRows) * kSubColumns);
-    return cells;
-}
-inline std::size_t cellOf(const Vec3d& w) {
-    const auto at = [](double share, std::size_t n) {
-        return std::min(n - 1, static_cast<std::size_t>(std::max(0.0, share) * static_cast<double>(n)));
-    };
-    return at((w[2] + 1) / 2, kRows) * kColumns + at((std::atan2(w[1], w[0]) + kPi) / (2 * kPi), kColumns);
-}
-inline double total(const std::array<double, kCells>& cells) {
-    double sum = 0;
-    for (const double c : cells) sum += c;
-    return sum;
-}
-
-/// Over the whole square of random numbers; the second pair along with it, by the sequence R₂ (Roberts
-/// 2018).
-template <class F>
-void overNumbers(F&& f, u32 side = 512) {
-    for (u32 i = 0; i < side; ++i)
-        for (u32 j = 0; j < side; ++j) {
-            const double n = i * side + (j * 197 + i * 61) % side;
-            CrtRandom2 u, choice;
-            u.x = (static_cast<f32>(i) + 0.5f) / static_cast<f32>(side);
-            u.y = (static_cast<f32>(j) + 0.5f) / static_cast<f32>(side);
-            const double x = n * 0.7548776662466927, y = n * 0.5698402909980532;
-            choice.x = static_cast<f32>(x - std::floor(x));
-            choice.y = static_cast<f32>(y - std::floor(y));
-            f(u, choice, 1.0 / (static_cast<double>(side) * side));
-        }
-}
 
 }  // namespace bsdf_test

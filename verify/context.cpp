@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <utility>
 
 namespace crt::verify {
@@ -165,6 +166,22 @@ void Context::equivalent(const std::string& what,
     }
 }
 
+namespace {
+
+/// By what an estimate multiplies its samples: by 2 where that will tell, even if the intervals narrow no
+/// faster than independent samples make them, otherwise by 4.
+std::uint64_t growthFor(const std::vector<Outcome>& outcomes, double delta) {
+    const auto remainsOpen = [delta](const Outcome& o) {
+        if (o.verdict != Verdict::Inconclusive) return false;
+        const double allowed = delta * std::abs(*o.expected), away = std::abs(*o.measured - *o.expected),
+                     half_width = (o.interval->upper - o.interval->lower) / 2 / std::numbers::sqrt2;
+        return !(away + half_width <= allowed || away - half_width > allowed);
+    };
+    return std::any_of(outcomes.begin(), outcomes.end(), remainsOpen) ? 4 : 2;
+}
+
+}  // namespace
+
 std::vector<Outcome> Context::estimated(const std::vector<Quantity>& quantities,
                                         const std::vector<std::string>& scenes, double delta,
                                         const Effort& effort, const std::vector<Mistake>& mistakes) {
@@ -177,7 +194,7 @@ std::vector<Outcome> Context::estimated(const std::vector<Quantity>& quantities,
     }
     const auto seeds = static_cast<std::size_t>(effort.seeds);
     std::vector<std::vector<Film>> films(seeds);
-    for (std::uint64_t there = 0, wanted = effort.samples;; wanted = std::min(4 * wanted, effort.most)) {
+    for (std::uint64_t there = 0, wanted = effort.samples;;) {
         for (std::size_t i = 0; i < seeds; ++i)
             for (std::size_t k = 0; k < parsed.size(); ++k) {
                 Film more =
@@ -199,6 +216,7 @@ std::vector<Outcome> Context::estimated(const std::vector<Quantity>& quantities,
         const bool told = std::none_of(outcomes.begin(), outcomes.end(),
                                        [](const Outcome& o) { return o.verdict == Verdict::Inconclusive; });
         if (told || wanted >= effort.most) return outcomes;
+        wanted = std::min(growthFor(outcomes, delta) * wanted, effort.most);
     }
 }
 

@@ -43,7 +43,7 @@ struct Mistake {
 };
 
 /// The number of samples that an estimate may take. It begins with `samples` a pixel and seed, and goes on
-/// with four times as many while it is inconclusive.
+/// with two or four times as many while it is inconclusive.
 struct Effort {
     std::uint64_t samples = 64;
     std::uint64_t most = 4096;

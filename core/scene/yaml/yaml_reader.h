@@ -89,7 +89,7 @@ public:
     std::size_t count() const { return errors_.size() + not_kept_; }
     /// True if the nearest of this number of names should be searched: the first errors get a suggestion,
     /// however many names there are, but not a hundred thousand errors over a hundred thousand names.
-    bool worthSuggesting(std::size_t names) const { return count() * names <= 1'000'000; }
+    bool worthSuggesting(std::size_t names) const { return count() * names <= 200'000; }
     /// Throws crt::Error(Scene) with all errors in the order of the text, if there are any.
     void throwIfFailed() const;
 
