@@ -1,5 +1,6 @@
 #include "host_kernels.h"
 
+#include <algorithm>
 #include <atomic>
 #include <cstring>
 #include <thread>
@@ -22,11 +23,12 @@ namespace {
 /// on.
 template <class Kernel>
 void launchGrid(unsigned grid_x, unsigned grid_y, unsigned host_threads, const Kernel& kernel) {
+    const std::uint64_t blocks = std::uint64_t{grid_x} * grid_y;
     std::atomic<std::uint64_t> next{0};
     const auto work = [&] {
         gridDim = {grid_x, grid_y, 1};
         blockDim = {CRT_BLOCK, 1, 1};
-        for (std::uint64_t block; (block = next.fetch_add(1)) < std::uint64_t{grid_x} * grid_y;) {
+        for (std::uint64_t block; (block = next.fetch_add(1)) < blocks;) {
             blockIdx = {static_cast<unsigned>(block % grid_x), static_cast<unsigned>(block / grid_x), 0};
             for (unsigned thread = 0; thread < CRT_BLOCK; ++thread) {
                 threadIdx = {thread, 0, 0};
@@ -35,7 +37,7 @@ void launchGrid(unsigned grid_x, unsigned grid_y, unsigned host_threads, const K
         }
     };
     std::vector<std::thread> threads;
-    for (unsigned i = 1; i < host_threads; ++i) threads.emplace_back(work);
+    for (unsigned i = 1; i < std::min<std::uint64_t>(host_threads, blocks); ++i) threads.emplace_back(work);
     work();
     for (std::thread& thread : threads) thread.join();
 }
