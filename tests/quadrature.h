@@ -1,4 +1,4 @@
-/// Integrals over directions and over the random numbers of a sample, without random numbers of their own.
+/// Integrals over directions, and over the random numbers of a sample, by fixed places and weights.
 #pragma once
 
 #include "kernel_test.h"
