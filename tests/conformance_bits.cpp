@@ -767,9 +767,9 @@ TEST_CASE("a kernel with everything in it gives the bits of the lean one", "[bit
     for (const Named& n : allScenes()) {
         // A compiler takes seconds for each kernel: half of the scenes are rendered with all AOVs, the other
         // half without any, and the plain ones both ways.
-        const bool with = number++ % 2 == 0;
+        const bool with_aovs = number++ % 2 == 0;
         for (const std::uint32_t aovs : {0u, kAllAovs}) {
-            if (with != (aovs != 0) && !n.plain) continue;
+            if (with_aovs != (aovs != 0) && !n.plain) continue;
             Run lean, full;
             lean.samples = full.samples = 4;
             lean.aovs = full.aovs = aovs;

@@ -3,6 +3,8 @@
 
 #include "kernel_test.h"
 
+#include <boost/math/quadrature/gauss.hpp>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -25,11 +27,14 @@ inline Vec3d spherical(double cosine, double phi) {
 constexpr std::size_t kRows = 32, kColumns = 32, kCells = kRows * kColumns;
 /// Places in [0,1] and their weights, which add up to 1.
 using Rule = std::vector<std::pair<double, double>>;
-/// Gauss and Legendre's, by the halves of their places in (0,1] and their weights.
-inline Rule gauss(const std::vector<std::pair<double, double>>& halves) {
+/// Gauss and Legendre's, of an even number of places.
+template <unsigned kCount>
+Rule gauss() {
+    using Halves = boost::math::quadrature::gauss<double, kCount>;  // Of [-1,1]: the places above 0.
     Rule rule;
-    for (const auto& [x, weight] : halves)
-        for (const double side : {-1.0, 1.0}) rule.emplace_back((1 + side * x) / 2, weight / 2);
+    for (std::size_t i = 0; i < kCount / 2; ++i)
+        for (const double side : {-1.0, 1.0})
+            rule.emplace_back((1 + side * Halves::abscissa()[i]) / 2, Halves::weights()[i] / 2);
     return rule;
 }
 inline Rule middles(std::size_t count) {
@@ -66,12 +71,7 @@ struct CellRule {
 /// bound the error by their size.
 template <class F>
 std::array<double, kCells> overCells(const F& f) {
-    static const CellRule coarse(
-        gauss({{0.3399810435848563, 0.6521451548625461}, {0.8611363115940526, 0.3478548451374538}})),
-        fine(gauss({{0.2386191860831969, 0.4679139345726910},
-                    {0.6612093864662645, 0.3607615730481386},
-                    {0.9324695142031521, 0.1713244923791704}})),
-        steps(middles(24));
+    static const CellRule coarse(gauss<4>()), fine(gauss<6>()), steps(middles(24));
     constexpr double kAgree = 1e-4, kNothing = 1e-9;
     std::array<double, kCells> cells{};
     for (std::size_t cell = 0; cell < kCells; ++cell) {

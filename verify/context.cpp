@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <span>
 #include <utility>
 
 namespace crt::verify {
@@ -30,6 +31,11 @@ Verdict verdictOf(stats::Verdict verdict) {
     return Verdict::Inconclusive;
 }
 
+/// The verdict on an interval that should lie within ±delta · |expected| of what is expected.
+Verdict equivalenceOf(const stats::Interval& interval, double expected, double delta) {
+    return verdictOf(stats::equivalence(relativeTo(expected, interval), delta * std::abs(expected)));
+}
+
 std::string tolerancePercent(double delta) { return fmt::format("± {:g} %, 99.9 % interval", 100 * delta); }
 
 Outcome equivalenceOutcome(const std::string& what, const std::vector<double>& replicates, double expected,
@@ -41,7 +47,7 @@ Outcome equivalenceOutcome(const std::string& what, const std::vector<double>& r
     o.expected = expected;
     o.interval = interval;
     o.tolerance = tolerancePercent(delta);
-    o.verdict = verdictOf(stats::equivalence(relativeTo(expected, interval), delta * std::abs(expected)));
+    o.verdict = equivalenceOf(interval, expected, delta);
     if (o.verdict == Verdict::Fail)
         o.physics = diagnose(interval.center(), expected, interval.halfWidth(), mistakes);
     if (o.verdict == Verdict::Inconclusive)
@@ -49,6 +55,18 @@ Outcome equivalenceOutcome(const std::string& what, const std::vector<double>& r
             "the interval is ± {:.3g} % wide: the noise is larger than the budget of samples allows for",
             100 * interval.halfWidth() / std::abs(expected));
     return o;
+}
+
+/// By what an estimate multiplies its samples: by 2 where that will tell, even if the intervals narrow no
+/// faster than independent samples make them, otherwise by 4.
+std::uint64_t growthFor(std::span<const Outcome> outcomes, double delta) {
+    const auto remainsOpen = [delta](const Outcome& o) {
+        if (o.verdict != Verdict::Inconclusive) return false;
+        const double half_width = o.interval->halfWidth() / std::numbers::sqrt2;
+        const stats::Interval narrowed{*o.measured - half_width, *o.measured + half_width};
+        return equivalenceOf(narrowed, *o.expected, delta) == Verdict::Inconclusive;
+    };
+    return std::any_of(outcomes.begin(), outcomes.end(), remainsOpen) ? 4 : 2;
 }
 
 /// Differing pixels, as the floats that are written.
@@ -158,29 +176,13 @@ void Context::equivalent(const std::string& what, const std::vector<double>& rep
 void Context::equivalent(const std::string& what,
                          const std::function<std::vector<double>(std::uint64_t)>& replicatesOf,
                          double expected, double delta, const Effort& effort) {
-    for (std::uint64_t samples = effort.samples;; samples = std::min(4 * samples, effort.most)) {
+    for (std::uint64_t samples = effort.samples;;) {
         Outcome outcome = equivalenceOutcome(what, replicatesOf(samples), expected, delta, {});
-        if (outcome.verdict == Verdict::Inconclusive && samples < effort.most) continue;
-        add(std::move(outcome));
-        return;
+        if (outcome.verdict != Verdict::Inconclusive || samples >= effort.most)
+            return add(std::move(outcome));
+        samples = std::min(growthFor({&outcome, 1}, delta) * samples, effort.most);
     }
 }
-
-namespace {
-
-/// By what an estimate multiplies its samples: by 2 where that will tell, even if the intervals narrow no
-/// faster than independent samples make them, otherwise by 4.
-std::uint64_t growthFor(const std::vector<Outcome>& outcomes, double delta) {
-    const auto remainsOpen = [delta](const Outcome& o) {
-        if (o.verdict != Verdict::Inconclusive) return false;
-        const double allowed = delta * std::abs(*o.expected), away = std::abs(*o.measured - *o.expected),
-                     half_width = (o.interval->upper - o.interval->lower) / 2 / std::numbers::sqrt2;
-        return !(away + half_width <= allowed || away - half_width > allowed);
-    };
-    return std::any_of(outcomes.begin(), outcomes.end(), remainsOpen) ? 4 : 2;
-}
-
-}  // namespace
 
 std::vector<Outcome> Context::estimated(const std::vector<Quantity>& quantities,
                                         const std::vector<std::string>& scenes, double delta,

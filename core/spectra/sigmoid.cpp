@@ -33,11 +33,11 @@ struct Sums {
 };
 
 /// Several nodes are computed at a time, then the channels of each: every sum keeps its order, and so its
-/// bits.
-CRT_FOR_AVX2_TOO void addNodes(const Vec3d& c, std::span<const SigmoidNode> nodes, Sums& sums) {
+/// bits. Not returned: how vectors are, depends on the processor.
+CRT_FOR_AVX2_TOO void sumOverNodes(const Vec3d& c, std::span<const SigmoidNode> nodes, Sums& sums) {
     constexpr std::size_t kBlock = 64;
     double values[kBlock], slopes[kBlock];
-    Sums s = sums;
+    Sums s;
     for (std::size_t first = 0; first < nodes.size(); first += kBlock) {
         const std::size_t count = std::min(kBlock, nodes.size() - first);
         const SigmoidNode* const block = nodes.data() + first;
@@ -63,7 +63,7 @@ CRT_FOR_AVX2_TOO void addNodes(const Vec3d& c, std::span<const SigmoidNode> node
 
 Residual evaluate(const Vec3d& c, const Vec3d& rgb, std::span<const SigmoidNode> nodes) {
     Sums sums;
-    addNodes(c, nodes, sums);
+    sumOverNodes(c, nodes, sums);
     Residual r;
     for (std::size_t k = 0; k < 3; ++k) {
         r.difference[k] = sums.value[k + 1] - rgb[k];
