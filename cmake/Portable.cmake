@@ -7,8 +7,9 @@
 #   crt-portable-bench.tar.gz  the programs of bench/run paper, likewise
 #
 # Unpacked anywhere, bin/crt runs, if the machine's glibc and libstdc++ are not older than this one's.
-# OpenImageIO and the 250 libraries it brings stay behind, being larger than all the rest: images are written
-# as .pfm and .ppm, not .exr and .png. The GPU's driver and NVRTC are the machine's own.
+# OpenImageIO and the 250 libraries it brings stay behind, being larger than all the rest, and the libraries
+# of other image formats with it: images are written as .pfm and .ppm, not .exr and .png. The GPU's driver and
+# NVRTC are the machine's own.
 #
 # Run as a script (cmake -P) it makes the archives from a build tree; the target does so with everything
 # built.
@@ -41,7 +42,8 @@ if(CMAKE_SCRIPT_MODE_FILE)
   run(${CMAKE_COMMAND} --install ${BUILD_DIR} --prefix ${tree})
   file(REMOVE_RECURSE ${tree}/include ${tree}/lib/cmake ${tree}/lib/pkgconfig ${tree}/share/doc)
   file(GLOB archives ${tree}/lib/*.a ${tree}/lib/libcrt.so*)
-  file(REMOVE ${archives} ${tree}/lib/crt/crt_image_oiio.so)
+  file(REMOVE ${archives} ${tree}/lib/crt/crt_image_oiio.so
+    ${tree}/lib/crt/crt_image_plain.so)
   file(COPY ${BUILD_DIR}/bin/crt-meshgen DESTINATION ${tree}/bin)
 
   # glibc must fit the kernel and the dynamic loader of the machine, and its drivers may need a newer
@@ -80,8 +82,8 @@ add_custom_target(portable
   COMMENT "Packing crt-portable.tar.gz"
   VERBATIM)
 # The targets whose files are installed or copied from the build tree.
-foreach(part crt crt_backend_cuda crt_backend_embree crt_backend_opencl crt_image_oiio crt_kernel_cache
-  crt_meshes crt_shell_files crt-meshgen
+foreach(part crt crt_backend_cuda crt_backend_embree crt_backend_opencl crt_image_oiio crt_image_plain
+  crt_kernel_cache crt_meshes crt_shell_files crt-meshgen
         conformance crt_backend_example libcrt paper_host paper_gpu)
   if(TARGET ${part})
     add_dependencies(portable ${part})

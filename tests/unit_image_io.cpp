@@ -71,7 +71,7 @@ Image fullImage() {
     return image;
 }
 
-bool mapsOpenImageIO() { return slurp("/proc/self/maps").find("libOpenImageIO") != std::string::npos; }
+bool maps(const char* library) { return slurp("/proc/self/maps").find(library) != std::string::npos; }
 
 /// Runs one hidden test case of `program` in a separate process, where nothing has been loaded yet.
 bool runAlone(const std::string& program, const char* tag, const std::string& environment = "") {
@@ -481,25 +481,30 @@ TEST_CASE("files get the permissions that the umask says", "[image_io]") {
     CHECK((status.st_mode & 0777) == 0640);
 }
 
-TEST_CASE("PFM and PPM load no image library", "[image_io]") {
+TEST_CASE("PFM and PPM load no image library, and PNG not OpenImageIO", "[image_io]") {
     CHECK(runAlone(thisProgram(), "[image-io-alone]"));
 }
 
-TEST_CASE("(in a process of its own) PFM and PPM load no image library", "[.][image-io-alone]") {
+TEST_CASE("(in a process of its own) each format loads its libraries alone", "[.][image-io-alone]") {
     const TemporaryFolder directory;
-    REQUIRE_FALSE(mapsOpenImageIO());
+    REQUIRE_FALSE(maps("libpng"));
+    REQUIRE_FALSE(maps("libOpenImageIO"));
     writeImage(directory / "image.pfm", OutputFormat::Pfm, rgbImage(1, 1, {1, 1, 1}));
     writeImage(directory / "image.ppm", OutputFormat::Ppm, rgbImage(1, 1, {1, 1, 1}));
     readImage(directory / "image.pfm");
     readImage(directory / "image.ppm");
-    CHECK_FALSE(mapsOpenImageIO());
+    CHECK_FALSE(maps("libpng"));
+    writeImage(directory / "image.png", OutputFormat::Png, rgbImage(1, 1, {1, 1, 1}));
+    readImage(directory / "image.png");
+    CHECK(maps("libpng"));
+    CHECK_FALSE(maps("libOpenImageIO"));
     writeImage(directory / "image.exr", OutputFormat::Exr, rgbImage(1, 1, {1, 1, 1}));
-    CHECK(mapsOpenImageIO());  // Or the checks above would prove nothing.
+    CHECK(maps("libOpenImageIO"));  // Or the checks above would prove nothing.
 }
 
-TEST_CASE("without the image module EXR and PNG are refused and the rest works", "[image_io]") {
-    // The module is looked for beside the program, so a program elsewhere does not find it. A link, because
-    // the program is large.
+TEST_CASE("without the image modules EXR and PNG are refused and the rest works", "[image_io]") {
+    // The modules are looked for beside the program, so a program elsewhere does not find them. A link,
+    // because the program is large.
     const TemporaryFolder directory(fs::path(thisProgram()).parent_path());
     fs::create_directories(directory / "bin");
     const std::string program = directory / "bin/tests";
@@ -507,21 +512,25 @@ TEST_CASE("without the image module EXR and PNG are refused and the rest works",
     CHECK(runAlone(program, "[image-io-no-module]", "CRT_BACKEND_PATH="));
 }
 
-TEST_CASE("(in a process of its own) without the image module", "[.][image-io-no-module]") {
+TEST_CASE("(in a process of its own) without the image modules", "[.][image-io-no-module]") {
     const TemporaryFolder directory;
-    for (const OutputFormat format : {OutputFormat::Exr, OutputFormat::Png}) {
+    const struct {
+        OutputFormat format;
+        const char *module, *others;
+    } cases[] = {{OutputFormat::Exr, "crt_image_oiio.so", ".png, .pfm and .ppm work without it"},
+                 {OutputFormat::Png, "crt_image_plain.so", ".exr, .pfm and .ppm work without it"}};
+    for (const auto& [format, module, others] : cases) {
         try {
             writeImage(directory / "image", format, rgbImage(1, 1, {1, 1, 1}));
             FAIL_CHECK("written");
         } catch (const Error& error) {
             CHECK(error.kind() == ErrorKind::Output);
-            CHECK_THAT(error.what(),
-                       Contains("crt_image_oiio.so") && Contains(".pfm and .ppm work without it"));
+            CHECK_THAT(error.what(), Contains(module) && Contains(others));
         }
     }
     CHECK(directory.fileCount() == 0);
     CHECK_NOTHROW(writeImage(directory / "image.pfm", OutputFormat::Pfm, rgbImage(1, 1, {1, 1, 1})));
     spit(directory / "text", "not an image");
     CHECK_THROWS_WITH(readImage(directory / "text"),
-                      Contains("cannot read") && Contains("crt_image_oiio.so"));
+                      Contains("cannot read") && Contains("crt_image_plain.so"));
 }

@@ -4,10 +4,14 @@
 #include "base/temporary_folder.h"
 #include "catch.h"
 #include "file_bytes.h"
+#include "image/image_io.h"
 #include "image/png_reader.h"
+#include "image/srgb_encoding.h"
 #include "image/texels.h"
 #include "png_file.h"
 
+#include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <random>
 
@@ -98,6 +102,137 @@ TEST_CASE("a PNG of a rarer kind is left to libpng, which reads it", "[png]") {
     std::string narrow = zlibStream(pixel);
     narrow.replace(0, 2, "\x08\x1d");
     check({1, 1}, pngOf({1, 1}, narrow), one);
+}
+
+namespace {
+
+/// An image of `kind` in which sample k of pixel (x, y) is the code (7x + 13y + 29k) mod 2^bits; a palette
+/// is chosen from by that code.
+unsigned codeAt(const PngKind& kind, unsigned x, unsigned y, unsigned k) {
+    return (7 * x + 13 * y + 29 * k) % (1u << std::min(kind.bits, 8u));
+}
+
+/// Rows of every pass, unfiltered (PNG Specification, 8.2): each pass is an image of its own.
+std::string passesOf(const PngKind& kind) {
+    struct Pass {
+        unsigned x, y, dx, dy;
+    };
+    static constexpr Pass kAdam7[] = {{0, 0, 8, 8}, {4, 0, 8, 8}, {0, 4, 4, 8}, {2, 0, 4, 4},
+                                      {0, 2, 2, 4}, {1, 0, 2, 2}, {0, 1, 1, 2}};
+    static constexpr Pass kWhole[] = {{0, 0, 1, 1}};
+    static constexpr unsigned kSamples[] = {1, 0, 3, 1, 2, 0, 4};
+    std::string rows;
+    const auto add = [&](const Pass& pass) {
+        for (unsigned y = pass.y; y < kind.height && pass.x < kind.width; y += pass.dy) {
+            std::vector<unsigned> bits;
+            for (unsigned x = pass.x; x < kind.width; x += pass.dx)
+                for (unsigned k = 0; k < kSamples[kind.color]; ++k) {
+                    const unsigned code = codeAt(kind, x, y, k) * (kind.bits == 16 ? 257 : 1);
+                    for (unsigned bit = kind.bits; bit-- > 0;) bits.push_back(code >> bit & 1);
+                }
+            bits.resize((bits.size() + 7) / 8 * 8);
+            rows += '\0';
+            for (std::size_t at = 0; at < bits.size(); at += 8) {
+                unsigned byte = 0;
+                for (std::size_t bit = 0; bit < 8; ++bit) byte = byte << 1 | bits[at + bit];
+                rows += static_cast<char>(byte);
+            }
+        }
+    };
+    if (kind.interlaced) {
+        for (const Pass& pass : kAdam7) add(pass);
+    } else {
+        add(kWhole[0]);
+    }
+    return rows;
+}
+
+/// Colour `code` of the palette: (code, 255 − code, 3 code mod 256), and its alpha 255 − 2 code.
+std::string paletteChunks(unsigned bits) {
+    std::string colors, alphas;
+    for (unsigned code = 0; code < 1u << bits; ++code) {
+        for (const unsigned value : {code, 255 - code, 3 * code % 256}) colors += static_cast<char>(value);
+        alphas += static_cast<char>((510 - 2 * code) % 256);
+    }
+    return pngChunk("PLTE", colors) + pngChunk("tRNS", alphas);
+}
+
+/// The 8-bit code of channel k (3 is alpha) of pixel (x, y); grey is 0.
+unsigned expectedAt(const PngKind& kind, unsigned x, unsigned y, unsigned k) {
+    const unsigned largest = (1u << std::min(kind.bits, 8u)) - 1;
+    const auto sample = [&](unsigned i) { return codeAt(kind, x, y, i) * 255 / largest; };
+    if (kind.color != 3) return sample(k == 3 ? (kind.color & 2 ? 3 : 1) : k);
+    const unsigned code = codeAt(kind, x, y, 0);
+    const unsigned color[] = {code, 255 - code, 3 * code % 256, (510 - 2 * code) % 256};
+    return color[k];
+}
+
+}  // namespace
+
+TEST_CASE("a PNG of any kind, interlaced or not, has the colours and the alpha it was made of", "[png]") {
+    const TemporaryFolder folder;
+    const std::string path = folder.path() + "/a.png";
+    const struct {
+        unsigned color;
+        std::vector<unsigned> bits;
+    } kinds[] = {{0, {1, 2, 4, 8, 16}}, {2, {8, 16}}, {3, {1, 2, 4, 8}}, {4, {8, 16}}, {6, {8, 16}}};
+    for (const auto& [color, all_bits] : kinds)
+        for (const unsigned bits : all_bits)
+            for (const bool interlaced : {false, true}) {
+                INFO("colour type " << color << ", " << bits << " bits, interlaced " << interlaced);
+                const PngKind kind{13, 11, bits, color, interlaced};
+                spit(path, pngOf(kind, zlibStream(passesOf(kind)), color == 3 ? paletteChunks(bits) : ""));
+                const Texels texels = readTexels(path), alpha = readAlpha(path);
+                const Image image = readImage(path);
+                const unsigned channels = color == 0 || color == 4 ? 1 : 3;
+                const bool has_alpha = color >= 3;
+                REQUIRE(texels.info.channels == channels);
+                REQUIRE(alpha.info.channels == (has_alpha ? 1u : 0u));
+                REQUIRE(image.width == kind.width);
+                REQUIRE(image.height == kind.height);
+                // Grey is compared as colours are.
+                const std::size_t planes = image.channels.size();
+                REQUIRE(planes == (has_alpha && channels == 3 ? 4u : 3u));
+                const std::size_t bytes = bits == 16 ? 2 : 1;
+                bool same = true;
+                for (unsigned y = 0; y < kind.height; ++y)
+                    for (unsigned x = 0; x < kind.width; ++x) {
+                        const std::size_t at = y * std::size_t{kind.width} + x;
+                        // Both bytes of a 16-bit code are the 8-bit code.
+                        for (unsigned k = 0; k < channels; ++k)
+                            for (std::size_t byte = 0; byte < bytes; ++byte)
+                                same = same && texels.bytes[(at * channels + k) * bytes + byte] ==
+                                                   expectedAt(kind, x, y, k);
+                        const double coverage = has_alpha ? expectedAt(kind, x, y, 3) / 255.0 : 1;
+                        if (has_alpha) same = same && alpha.bytes[at * bytes] == expectedAt(kind, x, y, 3);
+                        for (unsigned k = 0; k < 3; ++k) {
+                            const double code = expectedAt(kind, x, y, channels == 1 ? 0 : k) / 255.0;
+                            same = same && std::abs(image.pixels[at * planes + k] -
+                                                    coverage * srgbToLinear(code)) < 1e-6;
+                        }
+                    }
+                CHECK(same);
+            }
+}
+
+TEST_CASE("metadata that is not ASCII comes back from a PNG", "[png]") {
+    const TemporaryFolder folder;
+    const std::string path = folder.path() + "/a.png";
+    Image image;
+    image.width = image.height = 1;
+    image.channels = {"R", "G", "B"};
+    image.pixels = {0, 0, 0};
+    image.metadata = {{"crt/scene",
+                       "Stra\xc3\x9f"
+                       "e.yaml"},
+                      {"crt/seed", "7"}};
+    writeImage(path, OutputFormat::Png, image);
+    const Image back = readImage(path);
+    CHECK(metadataValue(back, "crt/scene") ==
+          "Stra\xc3\x9f"
+          "e.yaml");
+    CHECK(metadataValue(back, "crt/seed") == "7");
+    CHECK(slurp(path).find("iTXt") != std::string::npos);
 }
 
 TEST_CASE("a PNG with any byte damaged is left to libpng", "[png]") {

@@ -141,7 +141,7 @@ void textureColours(Context& context) {
     const TemporaryFolder folder;
     const std::string path = folder.path() + "/codes.png";
     try {
-        (void)imageModule(path, ErrorKind::Output);
+        (void)imageModule(ModuleFormat::Plain, path, ErrorKind::Output);
     } catch (const Error& error) {  // An archive for machines on which nothing can be installed has none.
         context.notApplicable("texels of 8 bits", error.what());
         return;

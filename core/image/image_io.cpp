@@ -204,7 +204,7 @@ using Reason = std::array<char, 512>;
 
 void writeExr(const std::string& path, const Image& image) {
     colorChannels(image);
-    const CrtImageModule& module = imageModule(path, ErrorKind::Output);
+    const CrtImageModule& module = imageModule(ModuleFormat::Exr, path, ErrorKind::Output);
     const std::vector<const char*> float_names = pointers(image.channels),
                                    integer_names = pointers(image.integer_channels);
     const std::vector<CrtImageText> metadata = texts(image);
@@ -241,7 +241,7 @@ void writeExr(const std::string& path, const Image& image) {
 }
 
 void writePng(const std::string& path, const Image& image, const EncodedImage& encoded) {
-    const CrtImageModule& module = imageModule(path, ErrorKind::Output);
+    const CrtImageModule& module = imageModule(ModuleFormat::Plain, path, ErrorKind::Output);
     std::vector<CrtImageText> metadata = texts(image);
     // The colour space of the image is not that of the pixels any more.
     for (CrtImageText& text : metadata)
@@ -256,7 +256,7 @@ void writePng(const std::string& path, const Image& image, const EncodedImage& e
 }
 
 Image readWithModule(const std::string& path) {
-    const CrtImageModule& module = imageModule(path, ErrorKind::Usage);
+    const CrtImageModule& module = imageModule(moduleFormatOf(path), path, ErrorKind::Usage);
     const CrtImagePlanes* planes = nullptr;
     Reason reason{};
     // Half: the pixels are there twice when the module hands them over.
@@ -295,9 +295,13 @@ Image readWithModule(const std::string& path) {
 
     image.chromaticities = chromaticities(ColorSpace::LinearSrgb);
     const std::size_t channels = image.channels.size();
-    for (std::size_t i = 0; i < image.pixels.size(); ++i)
-        if (image.channels[i % channels] != "A")
-            image.pixels[i] = static_cast<float>(srgbToLinear(image.pixels[i]));
+    const bool has_alpha = image.channels.back() == "A";
+    for (std::size_t p = 0; p < pixels; ++p) {
+        float* const pixel = &image.pixels[p * channels];
+        const double alpha = has_alpha ? pixel[channels - 1] : 1;
+        for (std::size_t k = 0; k + (has_alpha ? 1 : 0) < channels; ++k)
+            pixel[k] = static_cast<float>(alpha * srgbToLinear(pixel[k]));
+    }
     if (channels <= 2) {  // Grey, or grey with alpha.
         Image color = emptyRgb(image.width, image.height);
         color.metadata = std::move(image.metadata);

@@ -1,31 +1,22 @@
-// The image codec module: EXR and PNG through OpenImageIO, JPEG through libjpeg-turbo, sound PNG files that
-// are textures through libdeflate, Radiance HDR and TGA by its own readers, behind image_module.h. Built as
-// a separate library; nothing else in crt includes OpenImageIO.
-//
-// Over 450 lines: it is all of the module, and all that knows OpenImageIO.
+// The image module for EXR, through OpenImageIO, behind image_module.h. Built as a separate library; nothing
+// else in crt includes OpenImageIO.
 #include "image/image_headers.h"
 #include "image/image_module.h"
-#include "image/jpeg_reader.h"
-#include "image/png_reader.h"
-#include "image/radiance_reader.h"
-#include "image/tga_reader.h"
+#include "image/module_support.h"
 
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cerrno>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <exception>
-#include <fstream>
 #include <memory>
 #include <new>
 #include <string>
-#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -34,6 +25,7 @@
 
 namespace {
 
+using namespace crt::image;
 using OIIO::ImageInput;
 using OIIO::ImageOutput;
 using OIIO::ImageSpec;
@@ -49,36 +41,10 @@ bool contains(const Names& names, const char* name) {
                        [name](const char* n) { return std::strcmp(n, name) == 0; });
 }
 
-/// The functions below throw this to guarded(), which catches it.
-struct Failure {
-    std::string reason;
-};
-
 /// OpenImageIO's own words, or ours when it has none.
 std::string wordsOr(std::string words, const char* otherwise) {
     while (!words.empty() && (words.back() == '\n' || words.back() == ' ')) words.pop_back();
     return words.empty() ? otherwise : words;
-}
-
-/// Runs `body`; no exception leaves this file.
-template <class Body>
-std::int32_t guarded(char* reason, std::uint32_t reason_size, Body&& body) noexcept {
-    const auto say = [&](const char* text) {
-        if (reason != nullptr && reason_size > 0) std::snprintf(reason, reason_size, "%s", text);
-        return 1;
-    };
-    try {
-        body();
-        return 0;
-    } catch (const Failure& failure) {
-        return say(failure.reason.c_str());
-    } catch (const std::bad_alloc&) {
-        return say("there is not enough memory for its pixels");
-    } catch (const std::exception& exception) {
-        return say(exception.what());
-    } catch (...) {
-        return say("OpenImageIO failed in an unknown way");
-    }
 }
 
 void addMetadata(ImageSpec& spec, const CrtImageText* metadata, std::uint32_t count) {
@@ -147,26 +113,19 @@ private:
     int error_number_ = 0;
 };
 
-void writeWith(const char* format, const char* path, const ImageSpec& spec, const TypeDesc& type,
-               const void* pixels) {
+void write(const char* path, const ImageSpec& spec, const TypeDesc& type, const void* pixels) {
     CheckedFile file(path);  // Outlives the writer, whose destructor may still write.
     file.requireNoFailure();
-    const std::unique_ptr<ImageOutput> output = ImageOutput::create(format);
+    const std::unique_ptr<ImageOutput> output = ImageOutput::create("exr");
     if (!output) throw Failure{wordsOr(OIIO::geterror(), "this OpenImageIO was built without the format")};
     output->set_ioproxy(&file);
-    const auto write = [&] {
+    try {
         if (!output->open(path, spec))
             throw Failure{wordsOr(output->geterror(), "the file cannot be opened")};
         if (!output->write_image(type, pixels))
             throw Failure{wordsOr(output->geterror(), "the pixels cannot be written")};
         if (!output->close()) throw Failure{wordsOr(output->geterror(), "the file cannot be completed")};
-    };
-    try {
-        write();
     } catch (const std::exception&) {
-        file.requireNoFailure();
-        throw;
-    } catch (const Failure&) {
         file.requireNoFailure();  // The error of the disk is more precise than that of the library.
         throw;
     }
@@ -229,32 +188,10 @@ std::int32_t writeExr(const char* path, const CrtImagePlanes* image, char* reaso
             if (integers > 0) std::memcpy(next, image->integers + p * integers, integers * 4);
             next += integers * 4;
         }
-        writeWith("exr", path, spec, integers == 0 ? TypeDesc(TypeDesc::FLOAT) : TypeDesc(TypeDesc::UNKNOWN),
-                  packed.data());
+        write(path, spec, integers == 0 ? TypeDesc(TypeDesc::FLOAT) : TypeDesc(TypeDesc::UNKNOWN),
+              packed.data());
     });
 }
-
-std::int32_t writePng(const char* path, std::uint32_t width, std::uint32_t height, const std::uint8_t* rgb,
-                      const CrtImageText* metadata, std::uint32_t metadata_count, char* reason,
-                      std::uint32_t reason_size) {
-    return guarded(reason, reason_size, [&] {
-        ImageSpec spec(static_cast<int>(width), static_cast<int>(height), 3, TypeDesc::UINT8);
-        spec.attribute("oiio:ColorSpace", "sRGB");
-        addMetadata(spec, metadata, metadata_count);
-        writeWith("png", path, spec, TypeDesc::UINT8, rgb);
-    });
-}
-
-/// The image that read() returns, with the data that it points to.
-struct OwnedImage : CrtImagePlanes {
-    OwnedImage() : CrtImagePlanes{} {}
-    std::vector<std::string> float_names, integer_names, metadata_text;
-    std::vector<const char*> float_pointers, integer_pointers;
-    std::vector<CrtImageText> texts;
-    std::vector<float> float_values;
-    std::vector<std::uint32_t> integer_values;
-    std::array<float, 8> primaries{};
-};
 
 bool isInteger(const ImageSpec& spec, int channel) {
     // 8- and 16-bit integers are codes of a fraction; 32-bit ones are counts and ids.
@@ -262,107 +199,26 @@ bool isInteger(const ImageSpec& spec, int channel) {
     return type.basetype == TypeDesc::UINT32 || type.basetype == TypeDesc::INT32;
 }
 
-/// Formats of renders to compare, by the first bytes of such a file. Not left to OpenImageIO: it hands a
-/// file that it does not know to each of some thirty readers in turn, video codecs among them, which costs
-/// 0.2 s and trusts the least hardened of them with whatever the file holds. TIFF and JPEG are not among
-/// them: their readers did not stand fuzzing (docs/decisions/0005).
-struct KnownFormat {
-    const char* name;  ///< As OpenImageIO calls it.
-    std::string_view signature;
-    void (*check_header)(const std::string& path) = nullptr;
-};
-constexpr KnownFormat kKnownFormats[] = {
-    {"openexr", std::string_view("\x76\x2f\x31\x01", 4), crt::image::checkExrHeader},
-    {"png", std::string_view("\x89PNG\r\n\x1a\n", 8), crt::image::checkPngHeader},
-};
-
-/// First bytes of a file.
-std::string beginningOf(const char* path) {
-    char beginning[16] = {};
-    std::ifstream file(path, std::ios::binary);
-    file.read(beginning, sizeof beginning);
-    return {beginning, static_cast<std::size_t>(file.gcount())};
-}
-
-/// Null for a file of no known format.
-std::unique_ptr<ImageInput> openKnown(const char* path, ImageSpec& spec, const ImageSpec& wishes) {
-    const std::string beginning = beginningOf(path);
-    const std::string_view there(beginning);
-    for (const KnownFormat& format : kKnownFormats) {
-        if (there.substr(0, format.signature.size()) != format.signature) continue;
-        if (format.check_header != nullptr) format.check_header(path);
-        std::unique_ptr<ImageInput> input = ImageInput::create(format.name);
-        if (!input)
-            throw Failure{wordsOr(OIIO::geterror(), "this OpenImageIO was built without the format")};
-        if (!input->open(path, spec, wishes))
-            throw Failure{wordsOr(input->geterror(), "it cannot be opened")};
-        if (spec.deep) throw Failure{"it is a deep image"};
-        if (spec.depth > 1) throw Failure{"it is a volume"};
-        return input;
-    }
-    return nullptr;
-}
-
-bool isPng(const ImageInput& input) { return std::strcmp(input.format_name(), "png") == 0; }
-
-std::unique_ptr<ImageInput> openImage(const char* path, ImageSpec& spec) {
-    if (std::unique_ptr<ImageInput> input = openKnown(path, spec, ImageSpec())) return input;
-    throw Failure{
-        "it is not an EXR, PNG, PFM, PPM or Radiance HDR file; OpenImageIO's oiiotool converts other "
-        "formats: oiiotool IN -o OUT.exr"};
-}
-
-crt::image::RadianceHeader radianceHeader(const char* path) {
-    crt::image::RadianceHeader header;
-    const std::string why = crt::image::readRadiance(path, &header, nullptr, 0);
-    if (!why.empty()) throw Failure{why};
-    return header;
-}
-
-void takeTags(const crt::image::RadianceHeader& header, CrtUnappliedTags& tags) {
-    tags.exposure = static_cast<float>(header.exposure);
-    for (std::size_t k = 0; k < 3; ++k)
-        tags.color_correction[k] = static_cast<float>(header.color_correction[k]);
-}
-
-std::unique_ptr<OwnedImage> readRadianceImage(const char* path, std::uint64_t most_bytes) {
-    crt::image::RadianceHeader header = radianceHeader(path);
-    crt::image::checkMemory(header.width, header.height, 3 * sizeof(float), most_bytes);
-    auto owned = std::make_unique<OwnedImage>();
-    owned->float_values.resize(std::size_t{header.width} * header.height * 3);
-    const std::string why =
-        crt::image::readRadiance(path, &header, owned->float_values.data(), owned->float_values.size());
-    if (!why.empty()) throw Failure{why};
-    owned->float_names = {"R", "G", "B"};
-    for (const std::string& name : owned->float_names) owned->float_pointers.push_back(name.c_str());
-    owned->width = owned->whole_width = header.width;
-    owned->height = owned->whole_height = header.height;
-    owned->float_channel_count = 3;
-    owned->float_channels = owned->float_pointers.data();
-    owned->floats = owned->float_values.data();
-    if (header.chromaticities) {
-        owned->primaries = *header.chromaticities;
-        owned->chromaticities = owned->primaries.data();
-    }
-    takeTags(header, owned->tags);
-    return owned;
+std::unique_ptr<ImageInput> openExr(const char* path, ImageSpec& spec) {
+    checkExrHeader(path);
+    std::unique_ptr<ImageInput> input = ImageInput::create("openexr");
+    if (!input) throw Failure{wordsOr(OIIO::geterror(), "this OpenImageIO was built without the format")};
+    if (!input->open(path, spec)) throw Failure{wordsOr(input->geterror(), "it cannot be opened")};
+    if (spec.deep) throw Failure{"it is a deep image"};
+    if (spec.depth > 1) throw Failure{"it is a volume"};
+    return input;
 }
 
 std::int32_t readImage(const char* path, std::uint64_t most_bytes, const CrtImagePlanes** image,
                        char* reason, std::uint32_t reason_size) {
     return guarded(reason, reason_size, [&] {
-        if (crt::image::beginsAsRadiance(path)) {
-            *image = readRadianceImage(path, most_bytes).release();
-            return;
-        }
         ImageSpec spec;
-        const std::unique_ptr<ImageInput> input = openImage(path, spec);
+        const std::unique_ptr<ImageInput> input = openExr(path, spec);
         const auto width = static_cast<std::uint64_t>(std::max(spec.width, 0)),
                    height = static_cast<std::uint64_t>(std::max(spec.height, 0));
-        crt::image::checkMemory(width, height,
-                                static_cast<std::uint64_t>(std::max(spec.nchannels, 0)) * sizeof(float),
-                                most_bytes);
-        crt::image::checkRows(width, height, spec.pixel_bytes(true));
+        checkMemory(width, height, static_cast<std::uint64_t>(std::max(spec.nchannels, 0)) * sizeof(float),
+                    most_bytes);
+        checkRows(width, height, spec.pixel_bytes(true));
 
         auto owned = std::make_unique<OwnedImage>();
         owned->left = spec.x - spec.full_x;
@@ -397,8 +253,6 @@ std::int32_t readImage(const char* path, std::uint64_t most_bytes, const CrtImag
             first = end;
         }
 
-        // Reserved at once, because the C view points into the strings.
-        owned->metadata_text.reserve(2 * spec.extra_attribs.size());
         for (const OIIO::ParamValue& attribute : spec.extra_attribs) {
             const std::string name = attribute.name().string();
             const TypeDesc type = attribute.type();
@@ -414,31 +268,14 @@ std::int32_t readImage(const char* path, std::uint64_t most_bytes, const CrtImag
             owned->metadata_text.push_back(name);
             owned->metadata_text.push_back(std::move(value));
         }
-        for (std::size_t i = 0; i < owned->metadata_text.size(); i += 2)
-            owned->texts.push_back({owned->metadata_text[i].c_str(), owned->metadata_text[i + 1].c_str()});
-        for (const std::string& name : owned->float_names) owned->float_pointers.push_back(name.c_str());
-        for (const std::string& name : owned->integer_names) owned->integer_pointers.push_back(name.c_str());
-
-        CrtImagePlanes& view = *owned;
-        view.width = static_cast<std::uint32_t>(spec.width);
-        view.height = static_cast<std::uint32_t>(spec.height);
-        view.float_channel_count = static_cast<std::uint32_t>(owned->float_names.size());
-        view.integer_channel_count = static_cast<std::uint32_t>(owned->integer_names.size());
-        view.float_channels = owned->float_pointers.data();
-        view.integer_channels = owned->integer_pointers.data();
-        view.floats = owned->float_values.data();
-        view.integers = owned->integer_values.data();
-        view.metadata = owned->texts.data();
-        view.metadata_count = static_cast<std::uint32_t>(owned->texts.size());
-        if (isPng(*input)) view.tags = crt::image::tagsOfPng(path);
-        view.srgb_encoded =
-            spec.format.basetype == TypeDesc::UINT8 || spec.format.basetype == TypeDesc::UINT16;
+        owned->width = static_cast<std::uint32_t>(spec.width);
+        owned->height = static_cast<std::uint32_t>(spec.height);
+        owned->show();
         *image = owned.release();
     });
 }
 
-// ---- Images as values
-// -------------------------------------------------------------------------------------
+// ---- Images as values ---------------------------------------------------------------------------------
 
 /// The channels that are the colour: R, G and B, or the only one beside alpha.
 std::vector<int> colorChannels(const ImageSpec& spec) {
@@ -456,17 +293,10 @@ std::vector<int> colorChannels(const ImageSpec& spec) {
                   "single channel other than alpha (A) and depth (Z)"};
 }
 
-std::uint32_t texelType(const ImageSpec& spec) {
-    switch (spec.format.basetype) {
-        case TypeDesc::UINT8: return CRT_TEXELS_UINT8;
-        case TypeDesc::UINT16: return CRT_TEXELS_UINT16;
-        case TypeDesc::HALF:
-        case TypeDesc::FLOAT: return CRT_TEXELS_FLOAT;
-        default: throw Failure{"its pixels are neither floats nor of 8 or 16 bits"};
-    }
+void requireFloats(const ImageSpec& spec) {
+    if (spec.format.basetype != TypeDesc::HALF && spec.format.basetype != TypeDesc::FLOAT)
+        throw Failure{"its pixels are integers; a texture in an EXR file has floats or halves"};
 }
-
-enum class Part { Color, Alpha };
 
 /// The rectangle of a file's pixels in its image: an EXR's data window may be smaller or larger than its
 /// display window.
@@ -509,74 +339,32 @@ struct Placement {
     bool is_whole;
 };
 
-std::vector<int> channelsOf(const ImageSpec& spec, Part part) {
-    if (part == Part::Color) return colorChannels(spec);
+std::vector<int> channelsOf(const ImageSpec& spec, TexelPart part) {
+    if (part == TexelPart::Color) return colorChannels(spec);
     return spec.alpha_channel >= 0 ? std::vector<int>{spec.alpha_channel} : std::vector<int>{};
 }
 
-/// The caller's buffer.
-struct Target {
-    unsigned char* data;  ///< Null to read only the header.
-    std::uint64_t bytes;
-};
-
-/// Throws Failure with a reader's message, unless it is empty.
-void require(const std::string& why) {
-    if (!why.empty()) throw Failure{why};
-}
-
-void readJpegPart(Part part, const char* path, CrtTexelsInfo& info, const Target& to) {
-    require(crt::image::readJpeg(path, &info, part == Part::Color ? to.data : nullptr, to.bytes));
-    if (part == Part::Alpha) info.channels = 0;
-}
-
-void readTgaPart(Part part, const char* path, CrtTexelsInfo& info, const Target& to) {
-    if (!crt::image::beginsAsTga(path))
-        throw Failure{"it is not a PNG, JPEG, TGA, EXR, Radiance HDR or PFM file"};
-    const auto tga_part = part == Part::Color ? crt::image::TgaPart::Color : crt::image::TgaPart::Alpha;
-    require(crt::image::readTga(path, tga_part, &info, to.data, to.bytes));
-}
-
-void readRadiancePart(Part part, const char* path, CrtTexelsInfo& info, const Target& to) {
-    crt::image::RadianceHeader header = radianceHeader(path);
-    info.width = header.width;
-    info.height = header.height;
-    info.channels = part == Part::Color ? 3 : 0;
-    info.type = CRT_TEXELS_FLOAT;
-    info.has_chromaticities = header.chromaticities.has_value();
-    if (header.chromaticities)
-        std::copy(header.chromaticities->begin(), header.chromaticities->end(), info.chromaticities);
-    takeTags(header, info.tags);
-    if (to.data != nullptr && part == Part::Color)
-        require(crt::image::readRadiance(path, &header, reinterpret_cast<float*>(to.data),
-                                         to.bytes / sizeof(float)));
-}
-
-/// EXR and PNG.
-void readPartOf(ImageInput& input, const ImageSpec& spec, Part part, const char* path, CrtTexelsInfo& info,
+void readPartOf(ImageInput& input, const ImageSpec& spec, TexelPart part, CrtTexelsInfo& info,
                 const Target& to) {
     const auto width = static_cast<std::uint64_t>(std::max(spec.width, 0)),
                height = static_cast<std::uint64_t>(std::max(spec.height, 0));
-    crt::image::checkRows(width, height, spec.pixel_bytes(true));
+    checkRows(width, height, spec.pixel_bytes(true));
     const Placement placement(spec);
     placement.requireReasonable(spec);
     const std::vector<int> channels = channelsOf(spec, part);
     info.width = static_cast<std::uint32_t>(placement.width);
     info.height = static_cast<std::uint32_t>(placement.height);
     info.channels = static_cast<std::uint32_t>(channels.size());
-    info.type = texelType(spec);
+    requireFloats(spec);
+    info.type = CRT_TEXELS_FLOAT;
     info.has_chromaticities =
         spec.getattribute("chromaticities", TypeDesc(TypeDesc::FLOAT, 8), info.chromaticities);
-    if (isPng(input)) info.tags = crt::image::tagsOfPng(path);
     // OpenEXR, "Technical Introduction": colours are multiplied by alpha.
-    info.is_associated = !isPng(input) && spec.alpha_channel >= 0;
-    const TypeDesc type = info.type == CRT_TEXELS_UINT8    ? TypeDesc(TypeDesc::UINT8)
-                          : info.type == CRT_TEXELS_UINT16 ? TypeDesc(TypeDesc::UINT16)
-                                                           : TypeDesc(TypeDesc::FLOAT);
-    const std::size_t pixel = channels.size() * type.size();
+    info.is_associated = spec.alpha_channel >= 0;
+    const std::size_t pixel = channels.size() * sizeof(float);
     if (!channels.empty())
-        crt::image::checkChannels(width * height, spec.pixel_bytes(true),
-                                  static_cast<std::uint64_t>(spec.nchannels), pixel);
+        checkChannels(width * height, spec.pixel_bytes(true), static_cast<std::uint64_t>(spec.nchannels),
+                      pixel);
     if (to.data == nullptr) return;
 
     if (std::uint64_t{info.width} * info.height * pixel != to.bytes)
@@ -584,12 +372,11 @@ void readPartOf(ImageInput& input, const ImageSpec& spec, Part part, const char*
     std::vector<unsigned char> own;  // The file's pixels, where the picture has others.
     if (!placement.is_whole) own.resize(static_cast<std::size_t>(width * height) * pixel);
     auto* const bytes = placement.is_whole ? to.data : own.data();
-    if (part == Part::Color && isPng(input) && crt::image::readPng(path, info, bytes, to.bytes)) return;
     for (std::size_t c = 0; c < channels.size();) {
         std::size_t end = c + 1;
         while (end < channels.size() && channels[end] == channels[end - 1] + 1) ++end;
-        if (!input.read_image(0, 0, channels[c], channels[end - 1] + 1, type, bytes + c * type.size(),
-                              static_cast<OIIO::stride_t>(pixel)))
+        if (!input.read_image(0, 0, channels[c], channels[end - 1] + 1, TypeDesc::FLOAT,
+                              bytes + c * sizeof(float), static_cast<OIIO::stride_t>(pixel)))
             throw Failure{wordsOr(input.geterror(), "its pixels cannot be read")};
         c = end;
     }
@@ -598,33 +385,27 @@ void readPartOf(ImageInput& input, const ImageSpec& spec, Part part, const char*
     placement.place(spec, bytes, to.data, pixel);
 }
 
-std::int32_t readPart(Part part, const char* path, CrtTexelsInfo* info, const Target& to, char* reason,
+std::int32_t readPart(TexelPart part, const char* path, CrtTexelsInfo* info, const Target& to, char* reason,
                       std::uint32_t reason_size) {
     return guarded(reason, reason_size, [&] {
         *info = {};
-        if (beginningOf(path).compare(0, 3, "\xff\xd8\xff") == 0) return readJpegPart(part, path, *info, to);
-        if (crt::image::beginsAsRadiance(path)) return readRadiancePart(part, path, *info, to);
-        ImageSpec spec, wishes;
-        wishes.attribute("oiio:UnassociatedAlpha", 1);  // Else colours of PNG come multiplied by alpha.
-        if (const std::unique_ptr<ImageInput> input = openKnown(path, spec, wishes))
-            return readPartOf(*input, spec, part, path, *info, to);
-        readTgaPart(part, path, *info, to);
+        ImageSpec spec;
+        const std::unique_ptr<ImageInput> input = openExr(path, spec);
+        readPartOf(*input, spec, part, *info, to);
     });
 }
 
 std::int32_t readTexels(const char* path, CrtTexelsInfo* info, void* buffer, std::uint64_t buffer_bytes,
                         char* reason, std::uint32_t reason_size) {
-    return readPart(Part::Color, path, info, {static_cast<unsigned char*>(buffer), buffer_bytes}, reason,
-                    reason_size);
+    return readPart(TexelPart::Color, path, info, {static_cast<unsigned char*>(buffer), buffer_bytes},
+                    reason, reason_size);
 }
 
 std::int32_t readAlpha(const char* path, CrtTexelsInfo* info, void* buffer, std::uint64_t buffer_bytes,
                        char* reason, std::uint32_t reason_size) {
-    return readPart(Part::Alpha, path, info, {static_cast<unsigned char*>(buffer), buffer_bytes}, reason,
-                    reason_size);
+    return readPart(TexelPart::Alpha, path, info, {static_cast<unsigned char*>(buffer), buffer_bytes},
+                    reason, reason_size);
 }
-
-void freeImage(const CrtImagePlanes* image) { delete static_cast<const OwnedImage*>(image); }
 
 }  // namespace
 
@@ -632,12 +413,12 @@ extern "C" __attribute__((visibility("default"))) const CrtImageModule* CRT_IMAG
 
 extern "C" const CrtImageModule* CRT_IMAGE_MODULE_ENTRY(void) {
     static const bool reads_in_strips [[maybe_unused]] =
-        OIIO::attribute("read_chunk", static_cast<int>(crt::image::kStripRows));
+        OIIO::attribute("read_chunk", static_cast<int>(kStripRows));
     static const CrtImageModule table{sizeof(CrtImageModule),
                                       0,
                                       "OpenImageIO " OIIO_VERSION_STRING,
                                       writeExr,
-                                      writePng,
+                                      nullptr,
                                       readImage,
                                       freeImage,
                                       readTexels,

@@ -1,9 +1,12 @@
 /*
- * image_module.h: the border between crt and its image codec module, lib/crt/crt_image_oiio.so. C99.
- * OpenImageIO and the thirty libraries it brings are behind it, so that only a job that reads or writes EXR,
- * PNG, HDR, JPEG or TGA pays for them.
+ * image_module.h: the border between crt and its two image codec modules. C99.
  *
- * The module exports one symbol, which returns a table. No C++ type and no exception crosses; what the
+ *   lib/crt/crt_image_plain.so   PNG, JPEG, Radiance HDR and TGA, with three small libraries
+ *   lib/crt/crt_image_oiio.so    EXR, with OpenImageIO and the 250 libraries that it brings
+ *
+ * Only a job that reads or writes such a file pays for them.
+ *
+ * A module exports one symbol, which returns a table. No C++ type and no exception crosses; what the
  * module allocates the module frees. Functions return 0, or non-zero with one sentence in `reason`
  * (NUL-terminated, cut to reason_size). [any thread]
  */
@@ -16,10 +19,11 @@
 extern "C" {
 #endif
 
-#define CRT_IMAGE_MODULE_FILE "crt_image_oiio.so"
+#define CRT_IMAGE_PLAIN_FILE "crt_image_plain.so"
+#define CRT_IMAGE_EXR_FILE "crt_image_oiio.so"
 /* The symbol carries the version: a module of another version does not have it. */
-#define CRT_IMAGE_MODULE_ENTRY crt_image_module_v6
-#define CRT_IMAGE_MODULE_ENTRY_NAME "crt_image_module_v6"
+#define CRT_IMAGE_MODULE_ENTRY crt_image_module_v7
+#define CRT_IMAGE_MODULE_ENTRY_NAME "crt_image_module_v7"
 
 typedef struct CrtImageText {
     const char *name;
@@ -82,19 +86,20 @@ typedef struct CrtImageModule {
     uint32_t reserved;
     /* The library behind it, e.g. "OpenImageIO 2.4.7". */
     const char *build;
-    /* Every float channel as float, every integer channel as uint32, zip compressed. The file name need not
-     * end in .exr. */
+    /* Null in the module of other formats. Every float channel as float, every integer channel as uint32,
+     * zip compressed. The file name need not end in .exr. */
     int32_t (*write_exr)(const char *path, const CrtImagePlanes *image, char *reason, uint32_t reason_size);
-    /* 8-bit RGB, sRGB-encoded, interleaved. */
+    /* Null in the module of EXR. 8-bit RGB, sRGB-encoded, interleaved. */
     int32_t (*write_png)(const char* path, uint32_t width, uint32_t height, const uint8_t* rgb,
                          const CrtImageText* metadata, uint32_t metadata_count, char* reason,
                          uint32_t reason_size);
-    /* EXR, PNG or Radiance HDR, by content; the first image of a file that holds several. One whose pixels
-       take more than most_bytes is refused. *image stays valid until freed. */
+    /* EXR, or PNG and Radiance HDR, by content; the first image of a file that holds several. One whose
+       pixels take more than most_bytes is refused. *image stays valid until freed. */
     int32_t (*read)(const char *path, uint64_t most_bytes, const CrtImagePlanes **image, char *reason,
                     uint32_t reason_size);
     void (*free_image)(const CrtImagePlanes *image);
-    /* EXR, PNG, Radiance HDR, JPEG or TGA, by content. *info is filled in; with a buffer, which must have
+    /* EXR, or PNG, Radiance HDR, JPEG and TGA, by content. *info is filled in; with a buffer, which must
+       have
        the bytes that an earlier *info says, [height][width][channels], too. */
     int32_t (*read_texels)(const char *path, CrtTexelsInfo *info, void *buffer, uint64_t buffer_bytes,
                            char *reason, uint32_t reason_size);

@@ -90,7 +90,7 @@ enum class Part { Color, Alpha };
 
 /// Header, and pixels where there is a buffer.
 TexelsInfo readWithModule(const std::string& path, Part part, void* buffer, std::uint64_t bytes) {
-    const CrtImageModule& module = imageModule(path, ErrorKind::Scene);
+    const CrtImageModule& module = imageModule(moduleFormatOf(path), path, ErrorKind::Scene);
     CrtTexelsInfo raw{};
     std::array<char, 512> reason{};
     const auto read = part == Part::Color ? module.read_texels : module.read_alpha;

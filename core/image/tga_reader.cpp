@@ -103,7 +103,7 @@ unsigned alphaMeaning(const File& file, std::uint64_t file_bytes) {
 /// Puts pixels where they belong, in the order in which the file has them.
 class Canvas {
 public:
-    Canvas(const Header& header, std::vector<Pixel> map, TgaPart part, std::size_t channels,
+    Canvas(const Header& header, std::vector<Pixel> map, TexelPart part, std::size_t channels,
            unsigned char* to)
         : header_(header), map_(std::move(map)), part_(part), channels_(channels), to_(to) {}
 
@@ -125,7 +125,7 @@ public:
         const std::uint64_t y = header_.fromTheTop() ? row : header_.height - 1 - row,
                             x = header_.fromTheRight() ? header_.width - 1 - column : column;
         unsigned char* const at = to_ + (y * header_.width + x) * channels_;
-        at[0] = part_ == TgaPart::Alpha ? pixel.alpha : pixel.red;
+        at[0] = part_ == TexelPart::Alpha ? pixel.alpha : pixel.red;
         if (channels_ == 3) at[1] = pixel.green, at[2] = pixel.blue;
         ++next_;
         return true;
@@ -134,7 +134,7 @@ public:
 private:
     const Header& header_;
     std::vector<Pixel> map_;
-    TgaPart part_;
+    TexelPart part_;
     std::size_t channels_;
     unsigned char* to_;
     std::uint64_t next_ = 0;
@@ -172,7 +172,7 @@ bool beginsAsTga(const char* path) {
     return takeHeader(File(std::fopen(path, "rbe")), header);
 }
 
-std::string readTga(const char* path, TgaPart part, CrtTexelsInfo* info, unsigned char* buffer,
+std::string readTga(const char* path, TexelPart part, CrtTexelsInfo* info, unsigned char* buffer,
                     std::uint64_t buffer_bytes) {
     const File file(std::fopen(path, "rbe"));
     Header header;
@@ -198,7 +198,7 @@ std::string readTga(const char* path, TgaPart part, CrtTexelsInfo* info, unsigne
     }
     info->width = header.width;
     info->height = header.height;
-    info->channels = part == TgaPart::Alpha ? has_alpha : header.kind == kGrey ? 1 : 3;
+    info->channels = part == TexelPart::Alpha ? has_alpha : header.kind == kGrey ? 1 : 3;
     info->type = CRT_TEXELS_UINT8;
     if (buffer == nullptr || info->channels == 0) return {};
     if (pixels * info->channels != buffer_bytes) return "it has changed while it was read";

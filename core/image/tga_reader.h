@@ -2,7 +2,7 @@
 /// is two pages, and these lines are fuzzed.
 #pragma once
 
-#include "image/image_module.h"
+#include "image/module_support.h"
 
 #include <cstdint>
 #include <string>
@@ -13,12 +13,9 @@ namespace crt::image {
 /// agree. Ask after all formats that have one.
 bool beginsAsTga(const char* path);
 
-/// The pixels to read.
-enum class TgaPart { Color, Alpha };
-
 /// Fills in *info, and with a buffer of `buffer_bytes` the pixels, too. Returns why not; empty when all is
 /// well. A file that ends early, or whose runs do not fit, is refused.
-std::string readTga(const char* path, TgaPart part, CrtTexelsInfo* info, unsigned char* buffer,
+std::string readTga(const char* path, TexelPart part, CrtTexelsInfo* info, unsigned char* buffer,
                     std::uint64_t buffer_bytes);
 
 }  // namespace crt::image

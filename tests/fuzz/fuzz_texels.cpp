@@ -9,7 +9,8 @@
 /// Without it every input would be refused unread.
 extern "C" int LLVMFuzzerInitialize(int*, char***) {
     try {
-        crt::imageModule("seed.exr", crt::ErrorKind::Scene);
+        crt::imageModule(crt::ModuleFormat::Exr, "seed.exr", crt::ErrorKind::Scene);
+        crt::imageModule(crt::ModuleFormat::Plain, "seed.png", crt::ErrorKind::Scene);
     } catch (const crt::Error& error) {
         crt::fuzz::finding("there are no codecs", error.what());
     }

@@ -25,6 +25,8 @@ KEYWORDS = ("SOURCES", "USES", "LIBRARIES", "HEADERS")
 # Files of a room's folder that other targets are made of.
 OTHER_TARGETS = {
     "image/image_io_oiio.cpp",
+    "image/image_io_plain.cpp",
+    "image/png_codec.cpp",
     "image/exif_orientation.cpp",
     "image/icc_profile.cpp",
     "image/image_headers.cpp",
