@@ -8,8 +8,8 @@
 #
 # Unpacked anywhere, bin/crt runs, if the machine's glibc and libstdc++ are not older than this one's.
 # OpenImageIO and the 250 libraries it brings stay behind, being larger than all the rest, and the libraries
-# of other image formats with it: images are written as .pfm and .ppm, not .exr and .png. The GPU's driver and
-# NVRTC are the machine's own.
+# of other image formats with it: images are written as .pfm and .ppm, not .exr and .png. The machine has its
+# own driver of the GPU, and its own NVRTC.
 #
 # Run as a script (cmake -P) it makes the archives from a build tree; the target does so with everything
 # built.

@@ -112,7 +112,7 @@ unsigned codeAt(const PngKind& kind, unsigned x, unsigned y, unsigned k) {
     return (7 * x + 13 * y + 29 * k) % (1u << std::min(kind.bits, 8u));
 }
 
-/// Rows of every pass, unfiltered (PNG Specification, 8.2): each pass is an image of its own.
+/// Rows of every pass, unfiltered (PNG Specification, 8.2): each pass is a separate image.
 std::string passesOf(const PngKind& kind) {
     struct Pass {
         unsigned x, y, dx, dy;
