@@ -215,7 +215,7 @@ TEST_CASE("a PNG of any kind, interlaced or not, has the colours and the alpha i
             }
 }
 
-TEST_CASE("metadata that is not ASCII comes back from a PNG", "[png]") {
+TEST_CASE("metadata come back from a PNG, under the keywords of the specification", "[png]") {
     const TemporaryFolder folder;
     const std::string path = folder.path() + "/a.png";
     Image image;
@@ -225,14 +225,18 @@ TEST_CASE("metadata that is not ASCII comes back from a PNG", "[png]") {
     image.metadata = {{"crt/scene",
                        "Stra\xc3\x9f"
                        "e.yaml"},
-                      {"crt/seed", "7"}};
+                      {"crt/seed", "7"},
+                      {"ImageDescription", "A lamp"}};
     writeImage(path, OutputFormat::Png, image);
     const Image back = readImage(path);
     CHECK(metadataValue(back, "crt/scene") ==
           "Stra\xc3\x9f"
           "e.yaml");
     CHECK(metadataValue(back, "crt/seed") == "7");
-    CHECK(slurp(path).find("iTXt") != std::string::npos);
+    CHECK(metadataValue(back, "ImageDescription") == "A lamp");
+    const std::string bytes = slurp(path);
+    CHECK(bytes.find("iTXt") != std::string::npos);
+    CHECK(bytes.find(std::string("tEXtDescription\0A lamp", 22)) != std::string::npos);
 }
 
 TEST_CASE("a PNG with any byte damaged is left to libpng", "[png]") {

@@ -64,13 +64,32 @@ bool parseTime(const char* text, png_time* time) {
     return true;
 }
 
+/// Keywords that the specification gives to what EXR files name otherwise (PNG Specification, 11.3.3.2).
+struct Keyword {
+    std::string_view in_png, elsewhere;
+};
+constexpr Keyword kKeywords[] = {
+    {"Author", "Artist"}, {"Description", "ImageDescription"}, {"Title", "DocumentName"}};
+
+const char* keywordOf(const char* name) {
+    for (const Keyword& keyword : kKeywords)
+        if (keyword.elsewhere == name) return keyword.in_png.data();
+    return name;
+}
+
+std::string nameOf(const char* keyword) {
+    for (const Keyword& known : kKeywords)
+        if (known.in_png == keyword) return std::string(known.elsewhere);
+    return keyword;
+}
+
 /// tEXt is Latin-1 and iTXt is UTF-8 (PNG Specification, 11.3.3).
 png_text textOf(const CrtImageText& metadata) {
     const std::string_view value(metadata.value);
     const bool is_ascii = std::all_of(value.begin(), value.end(), [](unsigned char c) { return c < 0x80; });
     png_text text{};
     text.compression = is_ascii ? PNG_TEXT_COMPRESSION_NONE : PNG_ITXT_COMPRESSION_NONE;
-    text.key = const_cast<char*>(metadata.name);
+    text.key = const_cast<char*>(keywordOf(metadata.name));
     text.text = const_cast<char*>(metadata.value);
     text.text_length = is_ascii ? value.size() : 0;
     text.itxt_length = is_ascii ? 0 : value.size();
@@ -138,7 +157,7 @@ std::vector<std::pair<std::string, std::string>> PngFile::texts() const {
     png_textp texts = nullptr;
     const int count = png_get_text(reader_->codec, reader_->info, &texts, nullptr);
     std::vector<std::pair<std::string, std::string>> list;
-    for (int i = 0; i < count; ++i) list.emplace_back(texts[i].key, texts[i].text);
+    for (int i = 0; i < count; ++i) list.emplace_back(nameOf(texts[i].key), texts[i].text);
     return list;
 }
 

@@ -35,7 +35,7 @@ public:
     PngFile& operator=(const PngFile&) = delete;
 
     const PngLayout& layout() const { return layout_; }
-    /// Keyword and text of its text chunks before the pixels.
+    /// Name, as EXR files have it, and text of its text chunks before the pixels.
     std::vector<std::pair<std::string, std::string>> texts() const;
     /// Calls `take` for each row from the top. 16-bit samples have this machine's byte order.
     void readRows(const std::function<void(std::uint32_t y, const unsigned char* row)>& take);
