@@ -1,6 +1,7 @@
 # The targets that a backend links, with the same names in this tree and in an installed one:
 #   crt::backend_headers  backend/crt_backend.h, backend/sdk/*.h, the layout hash, kernel/*/*.h
-#   crt::kernel_cache     backend/sdk/kernel_cache.h and its code, to be linked into the plugin
+#   crt::kernel_cache     backend/sdk/kernel_cache.h and compile_process.h and their code, to be linked
+#                         into the plugin
 
 include(LayoutHash)
 include(CrtBackend)
@@ -16,6 +17,7 @@ set_target_properties(crt_backend_headers PROPERTIES EXPORT_NAME backend_headers
 
 # Uses nothing of the core, and XXH3 by its header alone, so that it can be compiled into any plugin.
 add_library(crt_kernel_cache STATIC ${PROJECT_SOURCE_DIR}/core/backend/sdk/kernel_cache.cpp
+  ${PROJECT_SOURCE_DIR}/core/backend/sdk/compile_process.cpp
   ${PROJECT_SOURCE_DIR}/core/base/code_trust.cpp)
 add_library(crt::kernel_cache ALIAS crt_kernel_cache)
 target_include_directories(crt_kernel_cache PRIVATE ${PROJECT_BINARY_DIR}/rooms/crt_base)

@@ -33,6 +33,8 @@ struct Run {
 
 /// --lean-kernels: the backend under test has other kernels than the full one, and must use them.
 bool leanKernels();
+/// Of the scenes whose lean kernels are compared with the full one, each of this number is taken.
+std::size_t leanStride();
 
 /// Compiles, opens, renders, reads back.
 crt::Film render(const crt::LoadedBackend& backend, const crt::Scene& scene, const Run& run,

@@ -13,6 +13,7 @@
 #include "render/session.h"
 #include "verify/program.h"
 
+#include <algorithm>
 #include <cstdio>
 #include <memory>
 #include <optional>
@@ -25,6 +26,7 @@ std::string backend_name = "embree";
 std::string reference_name;
 bool lean_kernels = false;
 bool no_cache = false;
+std::string lean_stride = "1";
 constexpr int kSkipped = 77;
 
 /// The backend of that name, where it is another than the one under test and runs here.
@@ -68,6 +70,8 @@ crt::Scene sceneFrom(const std::string& yaml, const std::vector<crt::SceneOverri
 }
 
 bool leanKernels() { return lean_kernels; }
+
+std::size_t leanStride() { return std::max(std::stoul(lean_stride), 1ul); }
 
 crt::Film render(const crt::LoadedBackend& with, const crt::Scene& scene, const Run& run,
                  CrtBackendReport* report) {
@@ -127,6 +131,7 @@ int main(int argc, char** argv) {
         {{"--backend", "backend under test, or a path to its .so", &conformance::backend_name},
          {"--against", "backend to compare bits with", &conformance::reference_name},
          {"--lean-kernels", "the backend must have lean kernels", nullptr, &conformance::lean_kernels},
+         {"--lean-stride", "compare the lean kernel of every N-th scene alone", &conformance::lean_stride},
          {"--no-cache", "do not keep compiled kernels on disk", nullptr, &conformance::no_cache}},
         probe);
 }

@@ -96,10 +96,15 @@ constexpr std::array kVariables{
     Variable{"CRT_KERNEL_DIR", "Kernel headers to be compiled instead of those in the program."},
     Variable{"CRT_OPENCL_WAVES",
              "1: OpenCL renders scenes of many materials on a processor as it does on a GPU, for tests."},
-    Variable{"CUDA_HOME", "The path of NVRTC, if the system does not find it."},
     Variable{
-        "CRT_SCENE_MEMORY",
-        "The maximum memory of a scene after its placements and aliases are expanded, such as 20GB."},
+        "CRT_CXX",
+        "The C++ compiler of lean Embree kernels, instead of the first of c++, g++ and clang++ in PATH."},
+    Variable{"CRT_COMPILE_AFTER",
+             "Seconds of rendering, of all processors together, after which the Embree backend compiles a "
+             "lean kernel, instead of 4."},
+    Variable{"CUDA_HOME", "The path of NVRTC, if the system does not find it."},
+    Variable{"CRT_SCENE_MEMORY",
+             "The maximum memory of a scene after its placements and aliases are expanded, such as 20GB."},
     Variable{"CRT_TABLE_SECONDS",
              "The maximum processor time, in seconds, for the tables of rough materials, instead of 6."},
     Variable{"SOURCE_DATE_EPOCH", "Seconds since 1970 that images and films carry as their date."},

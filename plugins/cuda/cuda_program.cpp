@@ -106,8 +106,8 @@ CudaProgram::CudaProgram(const plugin::Host& host, const Device& device, const g
         return;
     }
 
-    const char* directory = host_.cacheDirectory();
-    job_ = CompileJob{compiler->path(), text, device.arch, {}, directory != nullptr ? directory : "", {}};
+    if (const char* directory = host_.cacheDirectory()) cache_directory_ = directory;
+    job_ = CompileJob{compiler->path(), text, device.arch, {}};
     try {
         startCompilers();
         while (choice == CRT_KERNEL_LEAN_ONLY && !pending_.empty()) {
@@ -131,7 +131,7 @@ void CudaProgram::takeFromCache(const std::string& text, const Nvrtc& compiler) 
     const KernelCache cache(host_.cacheDirectory());
     lean_.resize(wanted_.size());
     for (std::size_t i = 0; i < wanted_.size(); ++i) {
-        Pending kernel{i, cacheKey(text, device_.arch, wanted_[i], compiler.name(), driver().version),
+        Pending kernel{i, cacheKey(text, device_.arch, wanted_[i], compiler.name(), driver().version), false,
                        nullptr};
         std::string refused;
         const std::optional<std::vector<unsigned char>> cubin = cache.load(kernel.key, &refused);
@@ -142,6 +142,7 @@ void CudaProgram::takeFromCache(const std::string& text, const Nvrtc& compiler) 
                 lean_[i] = loadKernel(cubin->data(), wanted_[i], lean_name_, device_);
                 continue;
             } catch (const plugin::PluginError& error) {
+                kernel.replaces = true;
                 host_.log(
                     CRT_LOG_DEBUG,
                     std::string("cuda: the cached kernel is refused, and compiled again: ") + error.what());
@@ -156,16 +157,18 @@ void CudaProgram::startCompilers() {
     // The host's cores render nothing meanwhile, but each compiler takes some 200 MB.
     const std::size_t most = std::clamp(std::thread::hardware_concurrency(), 1u, 16u);
     for (std::size_t i = 0; i < std::min(most, pending_.size()); ++i) {
-        if (pending_[i].process != nullptr) continue;
+        const plugin::CompilePlace place{cache_directory_, pending_[i].key, pending_[i].replaces};
+        // Many short renders, one after the other, would leave as many compilers behind.
+        if (pending_[i].process != nullptr || !plugin::CompileProcess::mayStart(place, most)) continue;
         job_.spec = wanted_[pending_[i].index];
-        job_.key = pending_[i].key;
-        pending_[i].process = std::make_unique<CompileProcess>(compileProgram(), job_);
+        pending_[i].process =
+            std::make_unique<plugin::CompileProcess>(compileProgram(), place, messageOf(job_));
     }
 }
 
 void CudaProgram::poll() {
     for (std::size_t i = 0; i < pending_.size();) {
-        const std::optional<CompiledKernel> compiled =
+        const std::optional<plugin::CompiledCode> compiled =
             pending_[i].process != nullptr ? pending_[i].process->poll() : std::nullopt;
         if (!compiled) {
             ++i;
@@ -175,7 +178,7 @@ void CudaProgram::poll() {
         pending_.erase(pending_.begin() + static_cast<std::ptrdiff_t>(i));
         compile_seconds_ += compiled->compile_seconds;
         cache_seconds_ += compiled->cache_seconds;
-        lean_[index] = loadKernel(compiled->cubin.data(), wanted_[index], lean_name_, device_);
+        lean_[index] = loadKernel(compiled->code.data(), wanted_[index], lean_name_, device_);
     }
     startCompilers();
 }

@@ -41,7 +41,8 @@ private:
     struct Pending {
         std::size_t index;  ///< In wanted_.
         plugin::KernelCache::Key key;
-        std::unique_ptr<CompileProcess> process;
+        bool replaces;  ///< The driver refuses the kernel that is in the cache.
+        std::unique_ptr<plugin::CompileProcess> process;
     };
     void takeFromCache(const std::string& text, const Nvrtc& compiler);
     void startCompilers();
@@ -53,7 +54,8 @@ private:
 
     plugin::Host host_;
     const Device& device_;
-    CompileJob job_;  ///< But for the spec and the key.
+    CompileJob job_;  ///< But for the spec.
+    std::string cache_directory_;
     std::string lean_name_;
     std::vector<GpuKernel> precompiled_, lean_;
     std::vector<Pending> pending_;

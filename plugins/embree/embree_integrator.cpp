@@ -76,6 +76,7 @@ bool EmbreeIntegrator::differsInViewAlone(const CrtSceneBlob& given) const {
 void EmbreeIntegrator::setScene(const CrtSceneBlob& scene_blob) {
     const bool same_tree = differsInViewAlone(scene_blob);
     if (!same_tree) {
+        program_.reset();
         tree_.reset();
         blob_.reset();
     }
@@ -97,7 +98,8 @@ void EmbreeIntegrator::setScene(const CrtSceneBlob& scene_blob) {
     if (!same_tree) blob_.reset(new Line[(scene_blob.size_bytes + sizeof(Line) - 1) / sizeof(Line)]);
     std::memcpy(blob_.get(), scene_blob.data, same_tree ? sizeof(kernel::CrtScene) : scene_blob.size_bytes);
     blob_bytes_ = scene_blob.size_bytes;
-    program_ = &chooseProgram(scene().features, info_.kernel);
+    if (!program_ || !same_tree)
+        program_ = std::make_unique<EmbreeProgram>(host_, scene().features, info_.kernel);
 
     const std::size_t pixels = static_cast<std::size_t>(scene().width) * scene().height;
     sums_.assign(pixels * scene().channels * 2, 0.0);
@@ -135,7 +137,10 @@ bool EmbreeIntegrator::render(const CrtRenderRange& range) {
     // One thread at a time calls the host, so that the others need not wait.
     const auto tell = [&] {
         const std::unique_lock lock(progress_mutex, std::try_to_lock);
-        if (lock.owns_lock() && host_.cancelled(static_cast<double>(done.load()) / all)) cancelled = true;
+        if (lock.owns_lock()) {
+            if (host_.cancelled(static_cast<double>(done.load()) / all)) cancelled = true;
+            program_->poll((render_seconds_ + secondsSince(start)) * threads_);
+        }
         return cancelled.load(std::memory_order_relaxed);
     };
     arena_.execute([&] {
@@ -145,7 +150,7 @@ bool EmbreeIntegrator::render(const CrtRenderRange& range) {
                 for (std::uint32_t tile = tiles.begin(); tile != tiles.end(); ++tile) {
                     TileJob job{};
                     job.blob = blob();
-                    job.tree = tree_.get();
+                    job.tree = tree_ ? tree_->root() : 0;
                     job.x0 = range.x0 + tile % columns * size;
                     job.y0 = range.y0 + tile / columns * size;
                     job.x1 = std::min(job.x0 + size, range.x1);
@@ -162,7 +167,7 @@ bool EmbreeIntegrator::render(const CrtRenderRange& range) {
                         job.first_sample = range.first_sample + s;
                         job.sample_count =
                             static_cast<std::uint32_t>(std::min(kSamplesPerJob, range.sample_count - s));
-                        const RayTotals rays = program_->render(job);
+                        const RayTotals rays = program_->current()(job);
                         closest += rays.closest;
                         shadow += rays.shadow;
                         done += job.sample_count;
@@ -189,9 +194,12 @@ void EmbreeIntegrator::readFilm(const CrtFilmView& film) {
 
 void EmbreeIntegrator::report(CrtBackendReport& report) {
     plugin::writeText(report.device, processorName());
-    if (program_ != nullptr) {
-        plugin::writeText(report.kernel, std::string("precompiled, ") + program_->name);
-        report.kernel_features = program_->features;
+    if (program_) {
+        plugin::writeText(report.kernel, program_->description());
+        report.kernel_features = program_->features();
+        report.kernel_from_cache = program_->fromCache() ? 1 : 0;
+        report.compile_seconds = program_->compileSeconds();
+        report.cache_seconds = program_->cacheSeconds();
     }
     report.build_seconds = build_seconds_;
     report.render_seconds = render_seconds_;

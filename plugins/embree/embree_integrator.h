@@ -46,7 +46,7 @@ private:
     tbb::task_arena arena_;
     std::unique_ptr<Device> device_;  ///< Opened when a scene needs it.
     std::unique_ptr<Tree> tree_;
-    const Program* program_ = nullptr;
+    std::unique_ptr<EmbreeProgram> program_;
     std::unique_ptr<Line[]> blob_;
     std::size_t blob_bytes_ = 0;
     std::vector<double> sums_;

@@ -2,9 +2,18 @@
 
 #include "embree_kernels.h"
 
+#include <algorithm>
 #include <array>
+#include <chrono>
+#include <cstdlib>
+#include <exception>
+#include <limits>
+#include <stdexcept>
+#include <thread>
 
 namespace crt::embree {
+
+using plugin::KernelCache;
 
 // One per row below; kernels.cpp defines them.
 RayTotals renderBox(const TileJob& job);
@@ -16,7 +25,7 @@ RayTotals renderAll(const TileJob& job);
 namespace {
 
 // kernels.cpp is compiled with the same masks. Smallest first.
-constexpr std::array<Program, 5> kPrograms{{
+constexpr std::array<Precompiled, 5> kPrograms{{
     {"box: a handful of diffuse triangles", CRT_EMBREE_BOX_FEATURES, renderBox},
     {"mesh: diffuse meshes", CRT_EMBREE_MESH_FEATURES, renderMesh},
     {"smooth: mirrors, metals and glass", CRT_EMBREE_SMOOTH_FEATURES, renderSmooth},
@@ -24,13 +33,122 @@ constexpr std::array<Program, 5> kPrograms{{
     {"all features", CRT_EMBREE_ALL_FEATURES, renderAll},
 }};
 
+using Clock = std::chrono::steady_clock;
+
+double secondsSince(Clock::time_point start) {
+    return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+double compileAfterSeconds() {
+    const char* const said = std::getenv("CRT_COMPILE_AFTER");
+    char* end = nullptr;
+    const double seconds = said != nullptr ? std::strtod(said, &end) : 0;
+    return end != said && end != nullptr && *end == '\0' && seconds >= 0 ? seconds : kSecondsBeforeCompiling;
+}
+
 }  // namespace
 
-const Program& chooseProgram(std::uint64_t scene_features, CrtKernelChoice choice) {
+const Precompiled& choosePrecompiled(std::uint64_t scene_features, CrtKernelChoice choice) {
     if (choice != CRT_KERNEL_FULL)
-        for (const Program& program : kPrograms)
+        for (const Precompiled& program : kPrograms)
             if ((scene_features & ~program.features) == 0) return program;
     return kPrograms.back();
+}
+
+EmbreeProgram::EmbreeProgram(const plugin::Host& host, std::uint64_t scene_features, CrtKernelChoice choice)
+    : host_(host),
+      scene_features_(scene_features),
+      choice_(choice),
+      precompiled_(choosePrecompiled(scene_features, choice)),
+      current_(precompiled_.render),
+      compile_after_seconds_(compileAfterSeconds()) {
+    if (choice == CRT_KERNEL_FULL || precompiled_.features == scene_features) return;
+    openCompiler();
+    if (choice != CRT_KERNEL_LEAN_ONLY || lean_) return;
+    while (compiler_) {
+        poll(std::numeric_limits<double>::infinity());
+        if (compiler_) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    rendered_precompiled_ = false;
+}
+
+void EmbreeProgram::openCompiler() {
+    try {
+        compiler_ = findCompiler(std::getenv("CRT_CXX"), std::getenv("PATH"));
+    } catch (const std::exception& error) {
+        giveUp(CRT_LOG_INFO, error.what());
+        return;
+    }
+    const Clock::time_point start = Clock::now();
+    text_ = kernelText(host_.kernelSource("kernel/schedule/pixel.h"));
+    if (const char* const directory = host_.cacheDirectory()) place_.cache_directory = directory;
+    place_.key = cacheKey(text_, *compiler_, scene_features_);
+    std::string refused;
+    const auto code = KernelCache(host_.cacheDirectory()).load(place_.key, &refused);
+    if (!refused.empty())
+        host_.log(CRT_LOG_WARNING, "embree: a cached kernel is refused, and compiled again: " + refused);
+    if (code) {
+        try {
+            take(*code);
+            from_cache_ = true;
+        } catch (const std::runtime_error& error) {
+            place_.replaces = true;
+            host_.log(
+                CRT_LOG_DEBUG,
+                std::string("embree: the cached kernel is refused, and compiled again: ") + error.what());
+        }
+    }
+    cache_seconds_ = secondsSince(start);
+}
+
+void EmbreeProgram::startCompiling() {
+    if (!compiler_) return;
+    try {
+        if (!plugin::CompileProcess::mayStart(place_, std::max(std::thread::hardware_concurrency(), 1u)))
+            return;
+        process_ = std::make_unique<plugin::CompileProcess>(compileProgram(), place_,
+                                                            messageOf(text_, *compiler_, scene_features_));
+    } catch (const std::exception& error) {
+        giveUp(CRT_LOG_WARNING, error.what());
+    }
+}
+
+void EmbreeProgram::take(const std::vector<unsigned char>& code) {
+    lean_.emplace(code);
+    compiler_.reset();
+    current_.store(lean_->render(), std::memory_order_release);
+}
+
+void EmbreeProgram::giveUp(CrtLogLevel level, const std::string& why) {
+    compiler_.reset();
+    process_.reset();
+    host_.log(level, std::string("embree: rendering with the precompiled kernel '") + precompiled_.name +
+                         "': " + why);
+}
+
+void EmbreeProgram::poll(double rendered) {
+    if (!compiler_) return;
+    if (!process_) {
+        rendered_precompiled_ = true;
+        if (rendered >= compile_after_seconds_) startCompiling();
+        return;
+    }
+    try {
+        const std::optional<plugin::CompiledCode> compiled = process_->poll();
+        if (!compiled) return;
+        process_.reset();
+        compile_seconds_ = compiled->compile_seconds;
+        cache_seconds_ += compiled->cache_seconds;
+        take(compiled->code);
+    } catch (const std::exception& error) {
+        giveUp(CRT_LOG_WARNING, error.what());
+    }
+}
+
+std::string EmbreeProgram::description() const {
+    const std::string precompiled = std::string("precompiled, ") + precompiled_.name;
+    if (!lean_) return precompiled;
+    return (rendered_precompiled_ ? precompiled + ", then " : std::string()) + "lean, " + lean_->compiler();
 }
 
 }  // namespace crt::embree

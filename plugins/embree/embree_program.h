@@ -1,40 +1,75 @@
-/// Feature mask → kernel: the smallest of those compiled ahead that covers the scene.
+/// From what a scene needs to the kernel that renders it: one of those compiled ahead at once, and the lean
+/// one from the disk cache or, compiled by a separate process, as soon as it is ready. They give the same
+/// bits, so a render may go over from one to the other between tiles.
 #pragma once
 
-#include "embree_tree.h"
+#include "embree_lean_kernel.h"
+#include "tile_job.h"
 
 #include "backend/crt_backend.h"
+#include "backend/sdk/plugin_guard.h"
 
+#include <atomic>
 #include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
 
 namespace crt::embree {
 
-/// Samples [first_sample, +sample_count) of the pixels [x0,x1) × [y0,y1), into the film's arrays
-/// (CrtFilmView's layout).
-struct TileJob {
-    const unsigned char* blob;
-    const Tree* tree;  ///< Null: the kernel traces by itself.
-    std::uint32_t x0, y0, x1, y1;
-    std::uint64_t first_sample;
-    std::uint32_t sample_count;
-    double* sums;
-    kernel::u64* counts;
-    std::uint32_t* primitives;
-    kernel::u64* splats;  ///< Null: the film takes none.
-    bool (*cancelled)(void* host);  ///< Asked now and then; true: the job may end at any place.
-    void* host;
-};
-
-struct RayTotals {
-    std::uint64_t closest = 0, shadow = 0;
-};
-
-struct Program {
+/// A kernel compiled ahead of time.
+struct Precompiled {
     const char* name;
     std::uint64_t features;
-    RayTotals (*render)(const TileJob& job);  ///< [any thread], for disjoint pixels
+    RenderTile render;
 };
 
-const Program& chooseProgram(std::uint64_t scene_features, CrtKernelChoice choice);
+/// The smallest one that covers the scene.
+const Precompiled& choosePrecompiled(std::uint64_t scene_features, CrtKernelChoice choice);
+
+/// Processor seconds of rendering after which the compiler is started, unless the environment's
+/// CRT_COMPILE_AFTER says others. The compiler takes about as many: however long the render is, both
+/// together take at most twice the time of the better choice.
+constexpr double kSecondsBeforeCompiling = 4;
+
+/// The kernels for one scene.
+class EmbreeProgram {
+public:
+    /// With CRT_KERNEL_LEAN_ONLY it waits for the compiler, with CRT_KERNEL_FULL none is lean.
+    EmbreeProgram(const plugin::Host& host, std::uint64_t scene_features, CrtKernelChoice choice);
+
+    /// The kernel to render with by now. [any thread]
+    RenderTile current() const { return current_.load(std::memory_order_acquire); }
+    /// Starts the compiler when `rendered` processor seconds are enough, and takes the kernel that is ready.
+    /// [one thread at a time]
+    void poll(double rendered);
+
+    /// "precompiled, all features, then lean, g++ 12.2.0".
+    std::string description() const;
+    std::uint64_t features() const { return lean_ ? scene_features_ : precompiled_.features; }
+    bool fromCache() const { return from_cache_; }
+    double compileSeconds() const { return compile_seconds_; }
+    double cacheSeconds() const { return cache_seconds_; }
+
+private:
+    void openCompiler();
+    void startCompiling();
+    void take(const std::vector<unsigned char>& code);
+    /// Goes on with the precompiled kernel, which gives the same image.
+    void giveUp(CrtLogLevel level, const std::string& why);
+
+    plugin::Host host_;
+    std::uint64_t scene_features_;
+    CrtKernelChoice choice_;
+    const Precompiled& precompiled_;
+    std::atomic<RenderTile> current_;
+    std::optional<Compiler> compiler_;  ///< None: there is nothing to be compiled any more.
+    std::string text_;
+    plugin::CompilePlace place_;
+    std::unique_ptr<plugin::CompileProcess> process_;
+    std::optional<LeanKernel> lean_;
+    bool rendered_precompiled_ = false, from_cache_ = false;
+    double compile_after_seconds_, compile_seconds_ = 0, cache_seconds_ = 0;
+};
 
 }  // namespace crt::embree

@@ -3,7 +3,7 @@
 /// separate lane, so that hits are the same bits as on every other backend.
 #pragma once
 
-#include "embree_tree.h"
+#include "tile_job.h"
 
 #include <immintrin.h>
 
@@ -121,7 +121,7 @@ inline CrtHit closestHit(const CrtContext* ctx, const CrtRay& ray) {
     const CrtNodeRay among = crt_node_ray(ray, 0.0f);
     Stacked stack[kStack];
     u32 size = 0u;
-    Child current = ctx->tree->root();
+    Child current = ctx->tree;
     for (;;) {
         if ((current & kMarks) == 0) {
             const Node8& node = *reinterpret_cast<const Node8*>(current);
@@ -164,7 +164,7 @@ inline bool anyHit(const CrtContext* ctx, const CrtRay& ray, CrtPassable* passab
     const CrtNodeRay among = crt_node_ray(ray, 0.0f);
     Child stack[kStack];
     u32 size = 1u;
-    stack[0] = ctx->tree->root();
+    stack[0] = ctx->tree;
     while (size != 0u) {
         const Child current = stack[--size];
         if ((current & kMarks) == 0) {

@@ -408,7 +408,7 @@ class KernelCaches(FakeGpuTest):
         self.assert_rendered(CRT_CACHE_DIR=disk)
 
     def test_several_processes_at_once(self):
-        """All begin with an empty cache, and compile and store the same kernel at the same time."""
+        """All begin with an empty cache and need the same kernel: one compiles it, and the others wait."""
         for round_number in range(3):
             folder = self.path(f"shared{round_number}")
             processes = [
@@ -431,6 +431,8 @@ class KernelCaches(FakeGpuTest):
                 self.assertNotIn("warning", messages)
                 self.assert_same(f"{i}.pfm", "whole.pfm")
             self.assertEqual(len(os.listdir(folder)), 1, os.listdir(folder))
+            compiled = [self.report(f"{i}.report.json")["seconds"]["kernel_compile"] > 0 for i in range(4)]
+            self.assertEqual(sum(compiled), 1, compiled)
             self.assert_rendered(from_cache=True, CRT_CACHE_DIR=folder)
 
 
