@@ -26,11 +26,12 @@ namespace {
 
 // kernels.cpp is compiled with the same masks. Smallest first.
 constexpr std::array<Precompiled, 5> kPrograms{{
-    {"box: a handful of diffuse triangles", CRT_EMBREE_BOX_FEATURES, renderBox},
-    {"mesh: diffuse meshes", CRT_EMBREE_MESH_FEATURES, renderMesh},
-    {"smooth: mirrors, metals and glass", CRT_EMBREE_SMOOTH_FEATURES, renderSmooth},
-    {"glossy: metals, glass, panes and plastic of any roughness", CRT_EMBREE_GLOSSY_FEATURES, renderGlossy},
-    {"all features", CRT_EMBREE_ALL_FEATURES, renderAll},
+    {"box: a handful of diffuse triangles", CRT_EMBREE_BOX_FEATURES, renderBox, true},
+    {"mesh: diffuse meshes", CRT_EMBREE_MESH_FEATURES, renderMesh, true},
+    {"smooth: mirrors, metals and glass", CRT_EMBREE_SMOOTH_FEATURES, renderSmooth, true},
+    {"glossy: metals, glass, panes and plastic of any roughness", CRT_EMBREE_GLOSSY_FEATURES, renderGlossy,
+     false},
+    {"all features", CRT_EMBREE_ALL_FEATURES, renderAll, false},
 }};
 
 using Clock = std::chrono::steady_clock;
@@ -62,7 +63,7 @@ EmbreeProgram::EmbreeProgram(const plugin::Host& host, std::uint64_t scene_featu
       precompiled_(choosePrecompiled(scene_features, choice)),
       current_(precompiled_.render),
       compile_after_seconds_(compileAfterSeconds()) {
-    if (choice == CRT_KERNEL_FULL || precompiled_.features == scene_features) return;
+    if (choice == CRT_KERNEL_FULL || precompiled_.is_lean_enough) return;
     openCompiler();
     if (choice != CRT_KERNEL_LEAN_ONLY || lean_) return;
     while (compiler_) {

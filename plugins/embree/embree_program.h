@@ -22,6 +22,7 @@ struct Precompiled {
     const char* name;
     std::uint64_t features;
     RenderTile render;
+    bool is_lean_enough;  ///< A kernel of the scene's features alone is no faster, by measurement.
 };
 
 /// The smallest one that covers the scene.
