@@ -59,7 +59,6 @@ const Precompiled& choosePrecompiled(std::uint64_t scene_features, CrtKernelChoi
 EmbreeProgram::EmbreeProgram(const plugin::Host& host, std::uint64_t scene_features, CrtKernelChoice choice)
     : host_(host),
       scene_features_(scene_features),
-      choice_(choice),
       precompiled_(choosePrecompiled(scene_features, choice)),
       current_(precompiled_.render),
       compile_after_seconds_(compileAfterSeconds()) {

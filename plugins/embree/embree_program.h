@@ -61,7 +61,6 @@ private:
 
     plugin::Host host_;
     std::uint64_t scene_features_;
-    CrtKernelChoice choice_;
     const Precompiled& precompiled_;
     std::atomic<RenderTile> current_;
     std::optional<Compiler> compiler_;  ///< None: there is nothing to be compiled any more.
