@@ -2,6 +2,7 @@
 #pragma once
 
 #include "base/error.h"
+#include "base/temporary_pattern.h"
 
 #include <fmt/format.h>
 
@@ -15,11 +16,6 @@
 #include <system_error>
 
 namespace crt {
-
-/// A pattern for mkstemp and mkdtemp, which replace its last six letters.
-inline std::string temporaryPattern(const std::filesystem::path& parent) {
-    return (parent / ("crt-" + std::string(6, 'X'))).string();
-}
 
 /// An empty folder, gone with the object.
 class TemporaryFolder {

@@ -385,26 +385,10 @@ void readPartOf(ImageInput& input, const ImageSpec& spec, TexelPart part, CrtTex
     placement.place(spec, bytes, to.data, pixel);
 }
 
-std::int32_t readPart(TexelPart part, const char* path, CrtTexelsInfo* info, const Target& to, char* reason,
-                      std::uint32_t reason_size) {
-    return guarded(reason, reason_size, [&] {
-        *info = {};
-        ImageSpec spec;
-        const std::unique_ptr<ImageInput> input = openExr(path, spec);
-        readPartOf(*input, spec, part, *info, to);
-    });
-}
-
-std::int32_t readTexels(const char* path, CrtTexelsInfo* info, void* buffer, std::uint64_t buffer_bytes,
-                        char* reason, std::uint32_t reason_size) {
-    return readPart(TexelPart::Color, path, info, {static_cast<unsigned char*>(buffer), buffer_bytes},
-                    reason, reason_size);
-}
-
-std::int32_t readAlpha(const char* path, CrtTexelsInfo* info, void* buffer, std::uint64_t buffer_bytes,
-                       char* reason, std::uint32_t reason_size) {
-    return readPart(TexelPart::Alpha, path, info, {static_cast<unsigned char*>(buffer), buffer_bytes},
-                    reason, reason_size);
+void readPart(TexelPart part, const char* path, CrtTexelsInfo& info, const Target& to) {
+    ImageSpec spec;
+    const std::unique_ptr<ImageInput> input = openExr(path, spec);
+    readPartOf(*input, spec, part, info, to);
 }
 
 }  // namespace
@@ -421,7 +405,7 @@ extern "C" const CrtImageModule* CRT_IMAGE_MODULE_ENTRY(void) {
                                       nullptr,
                                       readImage,
                                       freeImage,
-                                      readTexels,
-                                      readAlpha};
+                                      readPartBy<TexelPart::Color, readPart>,
+                                      readPartBy<TexelPart::Alpha, readPart>};
     return &table;
 }

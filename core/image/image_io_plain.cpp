@@ -165,27 +165,11 @@ void readPngPart(TexelPart part, const char* path, CrtTexelsInfo& info, const Ta
     });
 }
 
-std::int32_t readPart(TexelPart part, const char* path, CrtTexelsInfo* info, const Target& to, char* reason,
-                      std::uint32_t reason_size) {
-    return guarded(reason, reason_size, [&] {
-        *info = {};
-        if (beginsAsPng(path)) return readPngPart(part, path, *info, to);
-        if (beginsAsJpeg(path)) return readJpegPart(part, path, *info, to);
-        if (beginsAsRadiance(path)) return readRadiancePart(part, path, *info, to);
-        readTgaPart(part, path, *info, to);
-    });
-}
-
-std::int32_t readTexels(const char* path, CrtTexelsInfo* info, void* buffer, std::uint64_t buffer_bytes,
-                        char* reason, std::uint32_t reason_size) {
-    return readPart(TexelPart::Color, path, info, {static_cast<unsigned char*>(buffer), buffer_bytes},
-                    reason, reason_size);
-}
-
-std::int32_t readAlpha(const char* path, CrtTexelsInfo* info, void* buffer, std::uint64_t buffer_bytes,
-                       char* reason, std::uint32_t reason_size) {
-    return readPart(TexelPart::Alpha, path, info, {static_cast<unsigned char*>(buffer), buffer_bytes},
-                    reason, reason_size);
+void readPart(TexelPart part, const char* path, CrtTexelsInfo& info, const Target& to) {
+    if (beginsAsPng(path)) return readPngPart(part, path, info, to);
+    if (beginsAsJpeg(path)) return readJpegPart(part, path, info, to);
+    if (beginsAsRadiance(path)) return readRadiancePart(part, path, info, to);
+    readTgaPart(part, path, info, to);
 }
 
 std::int32_t writePngFile(const char* path, std::uint32_t width, std::uint32_t height,
@@ -207,7 +191,7 @@ extern "C" const CrtImageModule* CRT_IMAGE_MODULE_ENTRY(void) {
                                       writePngFile,
                                       readImage,
                                       freeImage,
-                                      readTexels,
-                                      readAlpha};
+                                      readPartBy<TexelPart::Color, readPart>,
+                                      readPartBy<TexelPart::Alpha, readPart>};
     return &table;
 }

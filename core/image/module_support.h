@@ -84,6 +84,16 @@ private:
     std::vector<CrtImageText> texts_;
 };
 
+/// The functions read_texels and read_alpha of a module, of its own `read`.
+template <TexelPart part, void (*read)(TexelPart, const char*, CrtTexelsInfo&, const Target&)>
+std::int32_t readPartBy(const char* path, CrtTexelsInfo* info, void* buffer, std::uint64_t buffer_bytes,
+                        char* reason, std::uint32_t reason_size) {
+    return guarded(reason, reason_size, [&] {
+        *info = {};
+        read(part, path, *info, {static_cast<unsigned char*>(buffer), buffer_bytes});
+    });
+}
+
 inline void freeImage(const CrtImagePlanes* image) { delete static_cast<const OwnedImage*>(image); }
 
 }  // namespace crt::image

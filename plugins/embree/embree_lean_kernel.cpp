@@ -14,7 +14,6 @@
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <sstream>
 #include <stdexcept>
 
@@ -57,46 +56,6 @@ Compiler compilerAt(const std::string& path) {
     if (::stat(file.c_str(), &status) != 0) throw std::runtime_error(path + ": " + std::strerror(errno));
     return {path, file.string() + ' ' + std::to_string(status.st_size) + ' ' +
                       std::to_string(status.st_mtim.tv_sec) + '.' + std::to_string(status.st_mtim.tv_nsec)};
-}
-
-/// A folder that is removed with all that is in it.
-class WorkFolder {
-public:
-    WorkFolder() {
-        std::string name = std::filesystem::temp_directory_path().string() + "/crt-kernel-XXXXXX";
-        if (::mkdtemp(name.data()) == nullptr)
-            throw std::runtime_error("no folder '" + name + "' for the compiler: " + std::strerror(errno));
-        path_ = name;
-    }
-    ~WorkFolder() {
-        std::error_code ignored;
-        std::filesystem::remove_all(path_, ignored);
-    }
-    WorkFolder(const WorkFolder&) = delete;
-    WorkFolder& operator=(const WorkFolder&) = delete;
-    std::string operator/(const char* name) const { return path_ + '/' + name; }
-
-private:
-    std::string path_;
-};
-
-/// The first line that says an error, or the first line.
-std::string firstError(const std::string& log_path) {
-    std::ifstream log(log_path);
-    std::string first;
-    for (std::string line; std::getline(log, line);) {
-        if (line.find("error") != std::string::npos) return line.substr(0, 300);
-        if (first.empty()) first = line.substr(0, 300);
-    }
-    return first.empty() ? "it said nothing" : first;
-}
-
-std::vector<unsigned char> bytesOf(const std::string& path) {
-    std::ifstream file(path, std::ios::binary);
-    std::ostringstream bytes;
-    bytes << file.rdbuf();
-    const std::string text = bytes.str();
-    return {text.begin(), text.end()};
 }
 
 }  // namespace
@@ -169,17 +128,7 @@ std::vector<unsigned char> compileJob(CompileMessage& message) {
     std::vector<std::string> command{plugin::trustedProgram(path)};
     for (auto left = message.nextNumber<std::size_t>(); left > 0; --left)
         command.push_back(message.nextText());
-    const WorkFolder folder;
-    const std::string source = folder / "kernel.cpp", library = folder / "kernel.so", log = folder / "log";
-    std::ofstream(source) << text;
-    command.insert(command.end(), {source, "-o", library});
-    const int status = plugin::runProgram(command, log);
-    if (status != 0)
-        throw std::runtime_error(path + " cannot compile the kernel: " +
-                                 (status < 0 ? "signal " + std::to_string(-status) : firstError(log)));
-    const std::vector<unsigned char> code = bytesOf(library);
-    if (code.empty()) throw std::runtime_error(path + " cannot compile the kernel: it has made no library");
-    return code;
+    return plugin::runCompiler(command, text);
 }
 
 LeanKernel::LeanKernel(const std::vector<unsigned char>& code) {

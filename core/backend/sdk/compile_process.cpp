@@ -1,5 +1,7 @@
 #include "backend/sdk/compile_process.h"
 
+#include "base/temporary_pattern.h"
+
 #include <dlfcn.h>
 #include <fcntl.h>
 #include <spawn.h>
@@ -14,7 +16,11 @@
 #include <chrono>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
 #include <mutex>
+#include <sstream>
 #include <utility>
 
 namespace crt::plugin {
@@ -179,6 +185,68 @@ pid_t spawn(const std::string& program, int job, int answer) {
     return process;
 }
 
+/// A folder that is removed with all that is in it.
+class WorkFolder {
+public:
+    WorkFolder() {
+        std::string pattern = temporaryPattern(std::filesystem::temp_directory_path());
+        if (::mkdtemp(pattern.data()) == nullptr)
+            throw std::runtime_error("no folder '" + pattern +
+                                     "' for the compiler: " + std::strerror(errno));
+        path_ = pattern;
+    }
+    ~WorkFolder() {
+        std::error_code ignored;
+        std::filesystem::remove_all(path_, ignored);
+    }
+    WorkFolder(const WorkFolder&) = delete;
+    WorkFolder& operator=(const WorkFolder&) = delete;
+    std::string operator/(const char* name) const { return path_ + '/' + name; }
+
+private:
+    std::string path_;
+};
+
+/// The first line that says an error, or the first line.
+std::string firstError(const std::string& log_path) {
+    std::ifstream log(log_path);
+    std::string first;
+    for (std::string line; std::getline(log, line);) {
+        if (line.find("error") != std::string::npos) return line.substr(0, 300);
+        if (first.empty()) first = line.substr(0, 300);
+    }
+    return first.empty() ? "it said nothing" : first;
+}
+
+std::vector<unsigned char> bytesOf(const std::string& path) {
+    std::ifstream file(path, std::ios::binary);
+    std::ostringstream bytes;
+    bytes << file.rdbuf();
+    const std::string text = bytes.str();
+    return {text.begin(), text.end()};
+}
+
+/// Runs a program to its end, with both outputs in a file. Returns its exit status, or −1 times the signal
+/// that ended it. Throws std::runtime_error where it cannot be started.
+int runProgram(const std::vector<std::string>& command, const std::string& output_file) {
+    SpawnSettings settings;
+    posix_spawn_file_actions_addopen(&settings.actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+    posix_spawn_file_actions_addopen(&settings.actions, STDOUT_FILENO, output_file.c_str(),
+                                     O_WRONLY | O_CREAT | O_TRUNC, 0600);
+    posix_spawn_file_actions_adddup2(&settings.actions, STDOUT_FILENO, STDERR_FILENO);
+    std::vector<char*> arguments;
+    for (const std::string& argument : command) arguments.push_back(const_cast<char*>(argument.c_str()));
+    arguments.push_back(nullptr);
+    pid_t process = -1;
+    const int error = ::posix_spawn(&process, arguments[0], &settings.actions, &settings.attributes,
+                                    arguments.data(), environ);
+    if (error != 0) throw std::runtime_error("cannot start '" + command[0] + "': " + std::strerror(error));
+    int status = 0;
+    while (::waitpid(process, &status, 0) < 0)
+        if (errno != EINTR) throw std::runtime_error(std::string("waitpid: ") + std::strerror(errno));
+    return WIFSIGNALED(status) ? -WTERMSIG(status) : WEXITSTATUS(status);
+}
+
 /// Ends this process, and every process that it has started where it leads a group.
 void endGroup(int) {
     if (::getpgrp() == ::getpid()) ::kill(0, SIGKILL);
@@ -306,23 +374,20 @@ std::optional<CompiledCode> CompileProcess::poll() {
     return compiled;
 }
 
-int runProgram(const std::vector<std::string>& command, const std::string& output_file) {
-    SpawnSettings settings;
-    posix_spawn_file_actions_addopen(&settings.actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
-    posix_spawn_file_actions_addopen(&settings.actions, STDOUT_FILENO, output_file.c_str(),
-                                     O_WRONLY | O_CREAT | O_TRUNC, 0600);
-    posix_spawn_file_actions_adddup2(&settings.actions, STDOUT_FILENO, STDERR_FILENO);
-    std::vector<char*> arguments;
-    for (const std::string& argument : command) arguments.push_back(const_cast<char*>(argument.c_str()));
-    arguments.push_back(nullptr);
-    pid_t process = -1;
-    const int error = ::posix_spawn(&process, arguments[0], &settings.actions, &settings.attributes,
-                                    arguments.data(), environ);
-    if (error != 0) throw std::runtime_error("cannot start '" + command[0] + "': " + std::strerror(error));
-    int status = 0;
-    while (::waitpid(process, &status, 0) < 0)
-        if (errno != EINTR) throw std::runtime_error(std::string("waitpid: ") + std::strerror(errno));
-    return WIFSIGNALED(status) ? -WTERMSIG(status) : WEXITSTATUS(status);
+std::vector<unsigned char> runCompiler(const std::vector<std::string>& command, const std::string& text) {
+    const WorkFolder folder;
+    const std::string source = folder / "kernel.cpp", library = folder / "kernel.so", log = folder / "log";
+    std::ofstream(source) << text;
+    std::vector<std::string> whole = command;
+    whole.insert(whole.end(), {source, "-o", library});
+    const int status = runProgram(whole, log);
+    const std::string failed = command[0] + " cannot compile the kernel: ";
+    if (status != 0)
+        throw std::runtime_error(failed +
+                                 (status < 0 ? "signal " + std::to_string(-status) : firstError(log)));
+    std::vector<unsigned char> code = bytesOf(library);
+    if (code.empty()) throw std::runtime_error(failed + "it has made no library");
+    return code;
 }
 
 std::string programBeside(const void* symbol, const char* name) {

@@ -90,9 +90,9 @@ private:
     int answer_ = -1;
 };
 
-/// Runs a program to its end, with both outputs in a file. Returns its exit status, or −1 times the signal
-/// that ended it. Throws std::runtime_error where it cannot be started.
-int runProgram(const std::vector<std::string>& command, const std::string& output_file);
+/// The shared library that a command-line compiler makes of `text`: runs `command`, followed by the source,
+/// "-o" and the library. Throws std::runtime_error with the compiler's first error.
+std::vector<unsigned char> runCompiler(const std::vector<std::string>& command, const std::string& text);
 
 /// The program `name` in the folder of the library or program that `symbol` is part of.
 std::string programBeside(const void* symbol, const char* name);
