@@ -17,6 +17,7 @@ set_target_properties(crt_backend_headers PROPERTIES EXPORT_NAME backend_headers
 
 # Uses nothing of the core, and XXH3 by its header alone, so that it can be compiled into any plugin.
 add_library(crt_kernel_cache STATIC ${PROJECT_SOURCE_DIR}/core/backend/sdk/kernel_cache.cpp
+  ${PROJECT_SOURCE_DIR}/core/backend/sdk/compile_message.cpp
   ${PROJECT_SOURCE_DIR}/core/backend/sdk/compile_process.cpp
   ${PROJECT_SOURCE_DIR}/core/base/code_trust.cpp)
 add_library(crt::kernel_cache ALIAS crt_kernel_cache)

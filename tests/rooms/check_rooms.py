@@ -34,6 +34,7 @@ OTHER_TARGETS = {
     "image/png_reader.cpp",
     "image/radiance_reader.cpp",
     "image/tga_reader.cpp",
+    "backend/sdk/compile_message.cpp",
     "backend/sdk/compile_process.cpp",
     "backend/sdk/kernel_cache.cpp",
     "cli/main.cpp",
