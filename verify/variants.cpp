@@ -257,8 +257,11 @@ std::vector<Variant> variants(int resolution) {
     return all;
 }
 
-void forEachVariant(Context& context, int resolution, void (*ask)(Context&, const Variant&)) {
-    for (const Variant& v : variants(resolution)) {
+void forEachVariant(Context& context, int resolution, void (*ask)(Context&, const Variant&),
+                    std::size_t step) {
+    const std::vector<Variant> all = variants(resolution);
+    for (std::size_t number = 0; number < all.size(); number += step) {
+        const Variant& v = all[number];
         if ((v.needs & ~context.backend().table->features) == 0)
             ask(context, v);
         else

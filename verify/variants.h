@@ -20,8 +20,9 @@ struct Variant {
 /// sampler, accelerator, filter and view once.
 std::vector<Variant> variants(int resolution);
 
-/// Asks of every variant that the backend has the features for.
-void forEachVariant(Context& context, int resolution, void (*ask)(Context&, const Variant&));
+/// Asks of every variant that the backend has the features for, or of every `step`-th variant.
+void forEachVariant(Context& context, int resolution, void (*ask)(Context&, const Variant&),
+                    std::size_t step = 1);
 
 /// All AOVs of first hits.
 inline constexpr std::uint32_t kAllAovs = kAovsOfFirstHits;

@@ -160,15 +160,16 @@ class Waiting(CliTest):
         if backend is None:
             self.skipTest("no backend has a device")
         long = ["--spp", "100000000"]
-        for command in (
+        commands = (
             ["render", "scene.yaml", "-b", backend, "-o", "a.pfm", *long],
             ["compare", "--backends", f"{backend},{backend}", "scene.yaml", *long],
             ["converge", "scene.yaml", "--backends", backend, "--time", "9h", "-o", "c"],
             ["reference", "scene.yaml", "-b", backend, "-o", "r.exr", *long],
             # One case, ten million rays at each of four kinds of place.
             ["verify", "-b", backend, "--level", "nightly", "--case", "B04"],
-        ):
-            process = subprocess.Popen(
+        )
+        processes = [
+            subprocess.Popen(
                 [harness.CRT, *command],
                 cwd=self.directory,
                 env=harness.environment(CRT_BACKEND_PATH=""),
@@ -177,9 +178,14 @@ class Waiting(CliTest):
                 text=True,
                 preexec_fn=harness.default_signals,
             )
-            time.sleep(2)
+            for command in commands
+        ]
+        self.addCleanup(lambda: [process.kill() for process in processes])
+        time.sleep(3)
+        for command, process in zip(commands, processes):
             self.assertIsNone(process.poll(), f"{command} has ended by itself")
             process.send_signal(signal.SIGINT)
+        for command, process in zip(commands, processes):
             try:
                 said, _ = process.communicate(timeout=harness.PATIENCE_SECONDS)
             except subprocess.TimeoutExpired:
