@@ -24,6 +24,17 @@ const crt::LoadedBackend& reference();
 /// A scene from YAML; meshes only inline.
 crt::Scene sceneFrom(const std::string& yaml, const std::vector<crt::SceneOverride>& overrides = {});
 
+constexpr std::uint32_t kAllAovs = crt::kAovsOfFirstHits;
+
+struct Named {
+    std::string name;
+    crt::Scene scene;
+    bool plain = false;  ///< Needs few features.
+};
+
+/// The scenes whose bits are held (conformance_bits.cpp).
+std::vector<Named> allScenes();
+
 struct Run {
     crt::IntegratorOptions options;
     std::uint64_t first_sample = 0;

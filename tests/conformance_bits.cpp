@@ -554,7 +554,6 @@ const Case kCases[] = {
      .camera_extra = "", .filter = "box", .textured = true},
 };
 
-constexpr std::uint32_t kAllAovs = crt::kAovsOfFirstHits;
 
 /// A room that needs little of the kernel, so that the lean kernel is another than the full one also where
 /// only a few are compiled ahead.
@@ -577,12 +576,6 @@ objects:
 )",
                                  integrator, normals));
 }
-
-struct Named {
-    std::string name;
-    crt::Scene scene;
-    bool plain = false;
-};
 
 crt::Scene sceneOf(const Case& c) {
     crt::Scene scene =
@@ -608,7 +601,9 @@ crt::Scene sceneOf(const Case& c) {
     return scene;
 }
 
-std::vector<Named> allScenes() {
+}  // namespace
+
+std::vector<Named> conformance::allScenes() {
     const char* const names[] = {"sobol",
                                  "tree, independent, lens, gaussian",
                                  "boxes, xorshift, blackman-harris",
@@ -657,6 +652,8 @@ std::vector<Named> allScenes() {
                    true});
     return all;
 }
+
+namespace {
 
 /// Of everything in the film, as doubles: the order of additions, which is the backend's own, shows 2^-100
 /// below the value.
@@ -759,37 +756,6 @@ TEST_CASE("the same bits as the portable build of the kernel", "[bits]") {
         CHECK(imageMean(ours) > 0);
         CHECK(ours.invalidSamples() == 0);
     }
-}
-
-TEST_CASE("a kernel with everything in it gives the bits of the lean one", "[bits]") {
-    bool lean_differs = false;
-    std::size_t number = 0;
-    for (const Named& n : allScenes()) {
-        // A compiler takes seconds for each kernel: half of the scenes are rendered with all AOVs, the other
-        // half without any, and the plain ones both ways.
-        const bool with_aovs = number % 2 == 0;
-        if (number++ % leanStride() != 0) continue;
-        for (const std::uint32_t aovs : {0u, kAllAovs}) {
-            if (with_aovs != (aovs != 0) && !n.plain) continue;
-            Run lean, full;
-            lean.samples = full.samples = 4;
-            lean.aovs = full.aovs = aovs;
-            lean.options.kernel = CRT_KERNEL_LEAN_ONLY;
-            full.options.kernel = CRT_KERNEL_FULL;
-            INFO(n.name << (aovs == 0 ? "" : ", all AOVs"));
-            CrtBackendReport of_lean{}, of_full{};
-            const crt::Film with_lean = render(backend(), n.scene, lean, &of_lean);
-            CHECK(differingPixels(with_lean, render(backend(), n.scene, full, &of_full)) == 0);
-            CHECK(of_full.kernel_features == CRT_FEATURES_ALL);
-            const std::uint64_t needed = crt::compileScene(n.scene, aovs).header().features;
-            CHECK((needed & ~of_lean.kernel_features) == 0);
-            // Otherwise one kernel was compared with itself.
-            if (n.plain && leanKernels()) CHECK(of_lean.kernel_features != of_full.kernel_features);
-            lean_differs = lean_differs || of_lean.kernel_features != of_full.kernel_features;
-        }
-    }
-    if (!lean_differs)
-        WARN("the backend has one kernel for all scenes, so there was nothing to compare it with");
 }
 
 TEST_CASE("threads and tiles do not show", "[bits]") {

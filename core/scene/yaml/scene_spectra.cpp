@@ -139,13 +139,15 @@ std::optional<Spectrum> SpectrumReader::resolveName(const std::string& name, con
     if (entry == nullptr) {
         if (use == SpectrumUse::White)
             if (std::optional<Spectrum> illuminant = illuminantSpectrum(name)) return illuminant;
-        std::vector<std::string> known;
-        if (named_ != nullptr)
-            for (const YamlEntry& e : named_->entries) known.push_back(e.key);
-        if (use == SpectrumUse::White)
-            known.insert(known.end(), illuminantNames().begin(), illuminantNames().end());
-        std::string suggestion =
-            out_.worthSuggesting(known.size()) ? didYouMean(name, known) : std::string();
+        std::string suggestion;
+        if (out_.worthSuggesting(entry_of_.size())) {  // A list of all names takes longer than an error.
+            std::vector<std::string> known;
+            if (named_ != nullptr)
+                for (const YamlEntry& e : named_->entries) known.push_back(e.key);
+            if (use == SpectrumUse::White)
+                known.insert(known.end(), illuminantNames().begin(), illuminantNames().end());
+            suggestion = didYouMean(name, known);
+        }
         if (suggestion.empty() && illuminantSpectrum(name))
             suggestion = fmt::format("write {{illuminant: {}}}", name);
         if (suggestion.empty() && glassIndex(name)) suggestion = fmt::format("write {{glass: {}}}", name);
