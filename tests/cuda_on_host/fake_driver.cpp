@@ -260,7 +260,7 @@ CRT_FAKE cuLaunchKernel(CUfunction function, unsigned grid_x, unsigned grid_y, u
     if (grid_x == 0 || grid_y == 0 || grid_y > 65535 || grid_z != 1 || block_y != 1 || block_z != 1 ||
         shared_bytes != 0 || extra != nullptr)
         return CUDA_ERROR_INVALID_VALUE;
-    const unsigned threads = std::max(1u, std::thread::hardware_concurrency());
+    static const unsigned threads = std::max(1u, std::thread::hardware_concurrency());  // Reads files.
     return crt::cuda_on_host::launchByName(function->name.c_str(), grid_x, grid_y, block_x, arguments,
                                            threads)
                ? CUDA_SUCCESS

@@ -36,8 +36,11 @@ void launchGrid(unsigned grid_x, unsigned grid_y, unsigned host_threads, const K
             }
         }
     };
+    // Fewer blocks are often done before another thread has started.
+    constexpr std::uint64_t kBlocksOfThread = 16;
     std::vector<std::thread> threads;
-    for (unsigned i = 1; i < std::min<std::uint64_t>(host_threads, blocks); ++i) threads.emplace_back(work);
+    for (unsigned i = 1; i < std::min<std::uint64_t>(host_threads, blocks / kBlocksOfThread); ++i)
+        threads.emplace_back(work);
     work();
     for (std::thread& thread : threads) thread.join();
 }
