@@ -53,8 +53,8 @@ struct Removal {
     void (*apply)(Scene& scene);
 };
 
-/// What a scene can do without. Each is one feature or few, so that a random choice of them leaves features
-/// that stand together in no scene of anybody.
+/// Changes that take a feature or two from a scene. A random choice of them leaves features that no other
+/// scene has together.
 const Removal kRemovals[] = {
     {"holes",
      [](Scene& s) { forMaterials(s, [](auto& m) { m.opacity = 1, m.opacity_texture = crt::kNoTexture; }); }},
@@ -170,15 +170,12 @@ TEST_CASE("lean kernels of random scenes give the bits of the full one", "[rando
     const std::vector<Named> scenes = allScenes();
     std::mt19937_64 random(47);
     std::set<std::uint64_t> masks;
-    std::size_t compared = 0;
     for (std::size_t number = 0; number < 250; ++number) {
         std::string name;
         const Scene scene = randomScene(scenes, random, name);
         if (number % leanStride() != 0) continue;
         INFO("number " << number << ": " << name);
         masks.insert(compareLean(scene, number % 3 == 0 ? kAllAovs : 0, 4).lean);
-        ++compared;
     }
-    // Otherwise there would be fewer than 200 kernels.
-    if (leanKernels()) CHECK(masks.size() * 5 >= compared * 4);
+    if (leanKernels() && leanStride() == 1) CHECK(masks.size() >= 200);
 }

@@ -270,7 +270,7 @@ void pruning(Context& context) {
     // A compiler takes seconds for each of them. The suite of conformance asks the same of other scenes.
     forEachVariant(
         context, 24, [](Context& c, const Variant& v) { prunes(c, v.name, v.scene, kAllAovs); },
-        context.byLevel(6, 1, 1));
+        context.byLevel(12, 1, 1));
     // Backends that compile a few kernels ahead need nearly everything for the rooms above; these need
     // little.
     for (const Accelerator accelerator : {Accelerator::None, Accelerator::Bvh}) {

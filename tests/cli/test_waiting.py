@@ -267,10 +267,10 @@ class Waiting(CliTest):
                     "--spp",
                     "8",
                     "--set",
-                    "film.resolution=[128,128]",
+                    "film.resolution=[64,64]",
                     CRT_BACKEND_PATH="",
                 )
-                size = os.path.getsize(self.path("a.crtfilm")) / 128**2
+                size = os.path.getsize(self.path("a.crtfilm")) / 64**2
                 with open(scene) as file:
                     keeps_the_spectrum = "  spectral:" in file.read()
                 if not keeps_the_spectrum:  # which takes as many channels as it has bins

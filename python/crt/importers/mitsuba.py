@@ -25,6 +25,15 @@ def read(path, parameters):
     return made.scene
 
 
+def merged(plugin):
+    """The shapes of a merge and of the merges in it, all counted before the first one is made."""
+    shapes = []
+    for part in plugin.all("shape"):
+        step(part.place)
+        shapes += merged(part) if part.kind == "merge" else [part]
+    return shapes
+
+
 class Importer:
     def __init__(self, reader, path):
         self.reader = reader
@@ -300,8 +309,7 @@ class Importer:
             self.unused(plugin)
             return
         if plugin.kind == "merge":
-            for part in plugin.all("shape"):
-                step(part.place)
+            for part in merged(plugin):
                 self.shape(part)
             return
         self.thing(plugin, [matrices.identity()])
