@@ -4,12 +4,12 @@
 
 #include <algorithm>
 #include <cfloat>
+#include <numbers>
 
 using namespace kernel_test;
 
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 
 /// Error in units in the last place of the exact result.
 double ulps(f32 computed, long double exact) {
@@ -39,7 +39,7 @@ f32 randomFloat(Random& random, int lowest_exponent, int highest_exponent) {
 
 TEST_CASE("sine and cosine of up to a quarter turn's half: below 1 ulp", "[kernel][math]") {
     double sine = 0, cosine = 0;
-    forFloats(0x1p-20f, static_cast<f32>(kPi / 4), 61, [&](f32 x) {
+    forFloats(0x1p-20f, static_cast<f32>(std::numbers::pi / 4), 61, [&](f32 x) {
         sine = std::max(sine, ulps(crt_sin_quarter(x), std::sin(static_cast<long double>(x))));
         cosine = std::max(cosine, ulps(crt_cos_quarter(x), std::cos(static_cast<long double>(x))));
         if (crt_sin_quarter(-x) != -crt_sin_quarter(x) || crt_cos_quarter(-x) != crt_cos_quarter(x))
@@ -68,7 +68,7 @@ TEST_CASE("sine and cosine of ten turns either way: 7.8e-8", "[kernel][math]") {
     });
     // Next to the multiples of π/4, where quadrants change and results vanish.
     for (int k = -81; k <= 81; ++k)
-        for (f32 x = static_cast<f32>(k * kPi / 4), n = 0; n < 50; ++n, x = crt_next_up(x)) {
+        for (f32 x = static_cast<f32>(k * std::numbers::pi / 4), n = 0; n < 50; ++n, x = crt_next_up(x)) {
             check(x);
             check(-x);
         }
@@ -108,10 +108,10 @@ TEST_CASE("arc tangent of up to 1, and of two numbers: the ulps that are promise
     CHECK(worst < 3.5);
     CHECK(crt_atan2(0.0f, 0.0f) == 0.0f);
     CHECK(crt_atan2(0.0f, 1.0f) == 0.0f);
-    CHECK(crt_atan2(0.0f, -1.0f) == static_cast<f32>(kPi));
-    CHECK(crt_atan2(1.0f, 0.0f) == static_cast<f32>(kPi / 2));
-    CHECK(crt_atan2(-1.0f, 0.0f) == static_cast<f32>(-kPi / 2));
-    CHECK(crt_atan2(-1.0f, -1.0f) == Approx(-3 * kPi / 4).epsilon(2e-7));
+    CHECK(crt_atan2(0.0f, -1.0f) == static_cast<f32>(std::numbers::pi));
+    CHECK(crt_atan2(1.0f, 0.0f) == static_cast<f32>(std::numbers::pi / 2));
+    CHECK(crt_atan2(-1.0f, 0.0f) == static_cast<f32>(-std::numbers::pi / 2));
+    CHECK(crt_atan2(-1.0f, -1.0f) == Approx(-3 * std::numbers::pi / 4).epsilon(2e-7));
 }
 
 TEST_CASE("a difference of products has the exact sign, and an error of at most 1.5 ulp", "[kernel][math]") {
@@ -232,7 +232,7 @@ TEST_CASE("the concentric map stays in the disk, is uniform, and keeps strata to
         const CrtRandom2 u = random.pair();
         const CrtRandom2 p = crt_concentric_disk(u);
         const double r2 = static_cast<double>(p.x) * p.x + static_cast<double>(p.y) * p.y;
-        const double turn = (std::atan2(p.y, p.x) + kPi) / (2 * kPi);
+        const double turn = (std::atan2(p.y, p.x) + std::numbers::pi) / (2 * std::numbers::pi);
         ++bins[std::min<std::size_t>(15, static_cast<std::size_t>(r2 * 16)) * 64 +
                std::min<std::size_t>(63, static_cast<std::size_t>(turn * 64))];
         // Points 1e-4 apart in the square are at most a few 1e-4 apart in the disk.

@@ -259,7 +259,7 @@ struct Text {
     Known known = {};
 };
 
-const std::string kTriangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+const std::string kObjTriangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
 constexpr const char* kMtl = "newmtl red\nKd 1 0 0\nnewmtl two words\nKd 0 1 0\n";
 
 const std::vector<Text> kObjTexts{
@@ -345,12 +345,12 @@ TEST_CASE("OBJ texts are what tinyobjloader reads, but for known differences", "
     folder.write("a.mtl", kMtl);
     for (const Text& text : kObjTexts) {
         INFO(text.text);
-        check(differencesOf(folder.write("a.obj", kTriangle + text.text)), text.known);
+        check(differencesOf(folder.write("a.obj", kObjTriangle + text.text)), text.known);
     }
     // The beginning of the file.
     const Known mark{{"areas", "positions"},
                      "the mark of UTF-8 is no part of the first line, which tinyobjloader loses"};
-    check(differencesOf(folder.write("a.obj", "\xEF\xBB\xBF" + kTriangle + "f 1 2 3\n")), mark);
+    check(differencesOf(folder.write("a.obj", "\xEF\xBB\xBF" + kObjTriangle + "f 1 2 3\n")), mark);
 }
 
 TEST_CASE("MTL texts are what tinyobjloader reads, but for known differences", "[obj][mtl]") {

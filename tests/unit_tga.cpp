@@ -45,7 +45,8 @@ std::string bgr(bool from_the_top, bool from_the_right, bool alpha) {
 /// As TGA 2.0 ends: what its alpha means, in an extension area.
 std::string withMeaning(std::string file, char meaning) {
     const std::size_t at = file.size();
-    file += std::string(494, '\0') + meaning;
+    file.append(494, '\0');
+    file += meaning;
     for (int k = 0; k < 4; ++k) file += static_cast<char>(at >> (8 * k) & 255);
     return file + std::string(4, '\0') + "TRUEVISION-XFILE." + '\0';
 }
