@@ -1,4 +1,4 @@
-// The same bits: against another backend, between lean and full kernels, and however the work is cut.
+// The same bits: against another backend, and however the work is cut.
 //
 // Over 450 lines: the list of scenes whose bits are held, in one place.
 #include "conformance.h"
@@ -554,7 +554,6 @@ const Case kCases[] = {
      .camera_extra = "", .filter = "box", .textured = true},
 };
 
-
 /// A room that needs little of the kernel, so that the lean kernel is another than the full one also where
 /// only a few are compiled ahead.
 crt::Scene plainScene(const std::string& integrator, const std::string& normals) {
@@ -746,7 +745,7 @@ TEST_CASE("a change of bits needs a new version of them", "[bits]") {
 TEST_CASE("the same bits as the portable build of the kernel", "[bits]") {
     for (const Case& c : kCases) {
         Run run;
-        run.samples = 4;
+        run.samples = 8;
         run.aovs = kAllAovs;
         run.options.kernel = CRT_KERNEL_FULL;
         const crt::Film ours = render(backend(), sceneOf(c), run);

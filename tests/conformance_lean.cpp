@@ -162,6 +162,7 @@ TEST_CASE("a kernel with everything in it gives the bits of the lean one", "[bit
             lean_differs = lean_differs || masks.lean != masks.full;
         }
     }
+    if (leanKernels()) CHECK(lean_differs);  // With a stride there may be no plain scene.
     if (!lean_differs)
         WARN("the backend has one kernel for all scenes, so there was nothing to compare it with");
 }

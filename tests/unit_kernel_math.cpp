@@ -10,7 +10,6 @@ using namespace kernel_test;
 
 namespace {
 
-
 /// Error in units in the last place of the exact result.
 double ulps(f32 computed, long double exact) {
     if (exact == 0) return computed == 0 ? 0 : HUGE_VAL;

@@ -139,12 +139,14 @@ std::optional<Spectrum> SpectrumReader::resolveName(const std::string& name, con
     if (entry == nullptr) {
         if (use == SpectrumUse::White)
             if (std::optional<Spectrum> illuminant = illuminantSpectrum(name)) return illuminant;
+        const bool takes_illuminants = use == SpectrumUse::White;
         std::string suggestion;
-        if (out_.worthSuggesting(entry_of_.size())) {  // A list of all names takes longer than an error.
+        // Asked before they are listed: a list of all names takes longer than an error.
+        if (out_.worthSuggesting(entry_of_.size() + (takes_illuminants ? illuminantNames().size() : 0))) {
             std::vector<std::string> known;
             if (named_ != nullptr)
                 for (const YamlEntry& e : named_->entries) known.push_back(e.key);
-            if (use == SpectrumUse::White)
+            if (takes_illuminants)
                 known.insert(known.end(), illuminantNames().begin(), illuminantNames().end());
             suggestion = didYouMean(name, known);
         }
