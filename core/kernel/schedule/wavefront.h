@@ -213,11 +213,11 @@ CRT_FN void crt_wave_shade(const CrtContext *ctx, const CrtWave *wave, u32 slot)
     CrtPath path;
     CrtShadow shadow;
     crt_load_path(ctx, wave, slot, &path);
+    path.radiance_row = crt_row(wave, CRT_ROW_RADIANCE, slot);
     const CrtHit hit = crt_load_hit(wave, slot);
     const int first = crt_wave_has_first_hit(ctx) && path.depth == 0u && hit.slot != CRT_NONE;
     const int alive = crt_shade(ctx, &path, hit, &shadow);
     u32 state = alive ? 0u : CRT_WAVE_ENDED;
-    *crt_row(wave, CRT_ROW_RADIANCE, slot) = path.radiance;
     if (alive) crt_store_vertex(ctx, wave, slot, &path);
     if (first) crt_store_first_hit(wave, slot, &path);
     if (CRT_HAS(NEE) && shadow.pending) {

@@ -42,9 +42,8 @@ CRT_FN void crt_add_emission(const CrtContext *ctx, CrtPath *path, const CrtSurf
             weight = area * cosines * crt_power_heuristic(ratio);
         }
     }
-    path->radiance = path->radiance +
-                     path->throughput *
-                         crt_value(ctx, emitter->radiance, surface, path->wavelengths.position) * weight;
+    const vec4 emitted = crt_value(ctx, emitter->radiance, surface, path->wavelengths.position);
+    crt_add_radiance(path, path->throughput * emitted * weight);
 }
 
 /* Radiance of the environment, weighted in the same way. */
@@ -58,9 +57,8 @@ CRT_FN void crt_add_environment(const CrtContext *ctx, CrtPath *path) {
         if (pdf > 0.0f && scene->nee == CRT_NEE_ONLY) return;
         weight = crt_power_heuristic(pdf / path->scatter_pdf);
     }
-    path->radiance =
-        path->radiance +
-        path->throughput * crt_environment_radiance(ctx, place, path->wavelengths.position) * weight;
+    const vec4 seen = crt_environment_radiance(ctx, place, path->wavelengths.position);
+    crt_add_radiance(path, path->throughput * seen * weight);
 }
 
 /* Emission where the ray meets nothing: the environment and suns. */
@@ -68,9 +66,8 @@ CRT_FN void crt_add_distant_emission(const CrtContext *ctx, CrtPath *path) {
     CRT_GLOBAL const CrtScene *scene = ctx->scene;
     if (CRT_HAS(ENVIRONMENT) && scene->environment != CRT_NONE) crt_add_environment(ctx, path);
     if (CRT_HAS(POINT_LIGHT) && scene->point_lights.count != 0u)
-        path->radiance =
-            path->radiance + path->throughput * crt_suns_seen(ctx, path->ray.d, path->scatter_pdf,
-                                                              path->wavelengths.position);
+        crt_add_radiance(path, path->throughput * crt_suns_seen(ctx, path->ray.d, path->scatter_pdf,
+                                                                path->wavelengths.position));
 }
 
 CRT_KERNEL_END

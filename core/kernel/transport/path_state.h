@@ -7,7 +7,7 @@
  *
  *   VERTEX  at each vertex
  *   TREE    at each vertex, in scenes with a tree of lights
- *   BEGIN   where a sample begins; shade.h and shadow rays add to its radiance
+ *   BEGIN   where a sample begins; crt_add_radiance and shadow rays add to its radiance
  *   FIRST   at the first vertex, in scenes with AOVs
  *
  * `declarations` are the members of CrtPath that the row holds, or begins to hold. `lanes` says which
@@ -54,7 +54,15 @@ CRT_KERNEL_BEGIN
 typedef struct CrtPath {
     CRT_PATH_STATE(CRT_PATH_MEMBERS, CRT_PATH_MEMBERS, CRT_PATH_MEMBERS, CRT_PATH_MEMBERS)
     u32 met; /* material that the ray has found a mix to be of (passing.h); or CRT_NONE */
+    CRT_GLOBAL vec4 *radiance_row; /* holds the radiance while a wave shades the path; or null */
 } CrtPath;
+
+/* Adds radiance that the path has found. A wave adds it to memory: registers are scarcest while it shades,
+   and most vertices add nothing. */
+CRT_FN void crt_add_radiance(CrtPath *path, vec4 found) {
+    if (path->radiance_row != 0) *path->radiance_row = *path->radiance_row + found;
+    else path->radiance = path->radiance + found;
+}
 
 CRT_FN vec4 crt_hero_lane(u32 lane) {
     return make_vec4(lane == 0u ? 1.0f : 0.0f, lane == 1u ? 1.0f : 0.0f, lane == 2u ? 1.0f : 0.0f,

@@ -27,6 +27,7 @@ CRT_FN void crt_path_begin(const CrtContext *ctx, CrtPath *path, u32 x, u32 y, u
         path->hero = crt_hero_lane(crt_sample_bits(&path->sampler, CRT_DIM_HERO) >> 30);
     path->throughput = splat4(1.0f);
     path->radiance = splat4(0.0f);
+    path->radiance_row = 0;
     path->scatter_pdf = 0.0f;
     path->scatter_cosine = 0.0f;
     path->p = path->ray.o;
