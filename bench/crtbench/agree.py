@@ -205,7 +205,8 @@ def measure(program, arguments):
         [f"{renders} renders of each scene by each program, {samples} samples per pixel, separate seeds; "
          f"crt on `{backend}`, Mitsuba {mi.__version__} (`{arguments.variant}`). Images agree when two "
          f"one-sided tests at 95 % put the ratio of the mean luminances within {MARGIN:.1%} of 1, and none "
-         f"of {TILES} × {TILES} tiles of the image differs, after that ratio, by more than {MARGIN:.1%} "
+         f"of {TILES} × {TILES} tiles of the image differs, once that ratio is divided out, by more than "
+         f"{MARGIN:.1%} "
          "and what chance explains at 95 %. The programs have different tables of the observer, which alone "
          "cause 0.1 %.",
          *notes],

@@ -47,8 +47,8 @@ def measure(program, arguments):
         results.paragraph("None.")
     results.claim(
         "How often `crt converge` is wrong where the truth is known",
-        f"{repeats} repeats of each situation: progressive means of samples, pixel by pixel, of known "
-        "variance, bias and cost, which go through the same analysis as renders. Samples are normal, or "
+        f"Each situation is simulated {repeats} times: progressive means of samples, pixel by pixel, of "
+        "known variance, bias and cost, go through the same analysis as renders. Samples are normal, or "
         "rare bright paths (*fireflies*). *Stated* is the share of statements that may be wrong. The last "
         "column lists the situations that exceed it by more than three standard errors, with the number of "
         f'statements. crt often makes none: "100.00% of 1" means that one of the {repeats:,} repeats made a '

@@ -51,9 +51,9 @@ In a pipe, with the scene on standard input and the image on standard output ('-
 
 constexpr const char* kExitCodes = R"(
 Exit codes: 0 done, 1 internal error, 2 command line, 3 scene, 4 backend or device not available,
-5 the device failed (the samples so far are saved), 6 output not written, 7 images differ or a case of
-verify fails, 128 + n stopped by signal n, such as 130 by Ctrl-C and 143 by kill (image and checkpoint are
-saved).
+5 the device failed or is too small (samples read back before are saved), 6 output not written, 7 images or
+backends differ or a case of verify fails, 128 + n stopped by signal n, such as 130 by Ctrl-C and 143 by kill
+(image and checkpoint are saved; a second signal stops at once).
 )";
 
 constexpr std::size_t kHelpColumns = 108, kHelpTextColumn = 28;

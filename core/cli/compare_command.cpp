@@ -29,12 +29,12 @@ namespace {
 constexpr int kDifferent = 7;
 
 constexpr const char* kCompareHelp = R"(
-Prints whether the bits are the same; the first difference, with both values and the number of floats
-between them (ulp); errors over all values of R, G and B; and the perceived difference (FLIP, Delta E). If
-an image states its noise (output AOV 'variance' or 'error', or a reference of 'crt reference'), it also
-prints whether the difference is noise or bias: the bias of each channel with its 99.9 % interval, and the
-number of tiles and pixels that differ by more than noise allows (alpha 0.1 %). A single NaN or infinity
-makes the whole comparison void; no value is dropped.
+Prints whether the bits are the same and, if not, the first difference, with both values and the number of
+floats between them (ulp); errors over all values of R, G and B; and the perceived difference (FLIP, Delta
+E). If an image states its noise (output AOV 'variance' or 'error', or a reference of 'crt reference') and
+the seeds differ, it also prints whether the difference is noise or bias: the bias of each channel with its
+99.9 % interval, and the number of tiles and, in small films, of pixels that differ by more than noise (at a
+level of 0.1 %). A single NaN or infinity makes the whole comparison void; no value is dropped.
 
 With --backends, every backend renders the scene with the same seed, for which crt's own backends give the
 same bits, and with different seeds for a verdict: PASS if the 99.9 % interval of the difference of the
