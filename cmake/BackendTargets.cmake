@@ -19,7 +19,7 @@ set_target_properties(crt_backend_headers PROPERTIES EXPORT_NAME backend_headers
 add_library(crt_kernel_cache STATIC ${PROJECT_SOURCE_DIR}/core/backend/sdk/kernel_cache.cpp
   ${PROJECT_SOURCE_DIR}/core/backend/sdk/compile_message.cpp
   ${PROJECT_SOURCE_DIR}/core/backend/sdk/compile_process.cpp
-  ${PROJECT_SOURCE_DIR}/core/base/code_trust.cpp)
+  ${PROJECT_SOURCE_DIR}/core/base/code_trust.cpp ${PROJECT_SOURCE_DIR}/core/base/file_cache.cpp)
 add_library(crt::kernel_cache ALIAS crt_kernel_cache)
 target_include_directories(crt_kernel_cache PRIVATE ${PROJECT_BINARY_DIR}/rooms/crt_base)
 target_link_libraries(crt_kernel_cache PUBLIC crt_backend_headers PRIVATE $<BUILD_INTERFACE:crt_flags>)

@@ -42,8 +42,8 @@ if(CMAKE_SCRIPT_MODE_FILE)
   run(${CMAKE_COMMAND} --install ${BUILD_DIR} --prefix ${tree})
   file(REMOVE_RECURSE ${tree}/include ${tree}/lib/cmake ${tree}/lib/pkgconfig ${tree}/share/doc)
   file(GLOB archives ${tree}/lib/*.a ${tree}/lib/libcrt.so*)
-  file(REMOVE ${archives} ${tree}/lib/crt/crt_image_oiio.so
-    ${tree}/lib/crt/crt_image_plain.so)
+  file(GLOB image_modules ${tree}/lib/crt/crt_image_*.so)
+  file(REMOVE ${archives} ${image_modules})
   file(COPY ${BUILD_DIR}/bin/crt-meshgen DESTINATION ${tree}/bin)
 
   # glibc must fit the kernel and the dynamic loader of the machine, and its drivers may need a newer
@@ -82,7 +82,8 @@ add_custom_target(portable
   COMMENT "Packing crt-portable.tar.gz"
   VERBATIM)
 # The targets whose files are installed or copied from the build tree.
-foreach(part crt crt_backend_cuda crt_backend_embree crt_backend_opencl crt_image_oiio crt_image_plain
+foreach(part crt crt_backend_cuda crt_backend_embree crt_backend_opencl
+  crt_image_exr crt_image_oiio crt_image_plain
   crt_kernel_cache crt_meshes crt_shell_files crt-meshgen
         conformance crt_backend_example libcrt paper_host paper_gpu)
   if(TARGET ${part})

@@ -171,7 +171,7 @@ TEST_CASE("lean kernels of random scenes give the bits of the full one", "[rando
     const std::vector<Named> scenes = allScenes();
     std::mt19937_64 random(47);
     std::set<std::uint64_t> masks;
-    for (std::size_t number = 0; number < 250; ++number) {
+    for (std::size_t number = 0; number < 300; ++number) {
         std::string name;
         const Scene scene = randomScene(scenes, random, name);
         if (number % leanStride() != 0) continue;

@@ -16,7 +16,7 @@ if(NOT count EQUAL 1)
 endif()
 
 run(dpkg-deb --field ${packages} Depends)
-foreach(library libc6 libyaml-cpp libfmt libspdlog libzstd libopenimageio libpng)
+foreach(library libc6 libyaml-cpp libfmt libspdlog libzstd libopenexr libopenimageio libpng)
   if(NOT output MATCHES "(^|, )${library}")
     message(FATAL_ERROR "the package does not depend on ${library}: ${output}")
   endif()
@@ -24,7 +24,8 @@ endforeach()
 
 run(dpkg-deb --extract ${packages} ${WORK_DIR}/unpacked)
 set(usr ${WORK_DIR}/unpacked/usr)
-foreach(file bin/crt lib/crt/crt_image_oiio.so lib/crt/crt_image_plain.so
+foreach(file bin/crt lib/crt/crt_image_exr.so lib/crt/crt_image_oiio.so
+  lib/crt/crt_image_plain.so
   share/crt/data/cornell/white.csv
   share/crt/configs/shared/cornell_room.yaml
         share/crt/meshes/sphere.obj share/man/man1/crt.1 share/bash-completion/completions/crt

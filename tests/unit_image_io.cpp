@@ -481,7 +481,7 @@ TEST_CASE("files get the permissions that the umask says", "[image_io]") {
     CHECK((status.st_mode & 0777) == 0640);
 }
 
-TEST_CASE("PFM and PPM load no image library, and PNG not OpenImageIO", "[image_io]") {
+TEST_CASE("PFM and PPM load no image library, and none but reading EXR loads OpenImageIO", "[image_io]") {
     CHECK(runAlone(thisProgram(), "[image-io-alone]"));
 }
 
@@ -498,7 +498,11 @@ TEST_CASE("(in a process of its own) each format loads its libraries alone", "[.
     readImage(directory / "image.png");
     CHECK(maps("libpng"));
     CHECK_FALSE(maps("libOpenImageIO"));
+    CHECK_FALSE(maps("libOpenEXR"));
     writeImage(directory / "image.exr", OutputFormat::Exr, rgbImage(1, 1, {1, 1, 1}));
+    CHECK(maps("libOpenEXR"));
+    CHECK_FALSE(maps("libOpenImageIO"));
+    readImage(directory / "image.exr");
     CHECK(maps("libOpenImageIO"));  // Or the checks above would prove nothing.
 }
 
@@ -517,7 +521,7 @@ TEST_CASE("(in a process of its own) without the image modules", "[.][image-io-n
     const struct {
         OutputFormat format;
         const char *module, *others;
-    } cases[] = {{OutputFormat::Exr, "crt_image_oiio.so", ".png, .pfm and .ppm work without it"},
+    } cases[] = {{OutputFormat::Exr, "crt_image_exr.so", ".png, .pfm and .ppm work without it"},
                  {OutputFormat::Png, "crt_image_plain.so", ".exr, .pfm and .ppm work without it"}};
     for (const auto& [format, module, others] : cases) {
         try {
@@ -533,4 +537,7 @@ TEST_CASE("(in a process of its own) without the image modules", "[.][image-io-n
     spit(directory / "text", "not an image");
     CHECK_THROWS_WITH(readImage(directory / "text"),
                       Contains("cannot read") && Contains("crt_image_plain.so"));
+    spit(directory / "mark", "\x76\x2f\x31\x01");
+    CHECK_THROWS_WITH(readImage(directory / "mark"),
+                      Contains("cannot read") && Contains("crt_image_oiio.so"));
 }

@@ -4,9 +4,10 @@
 #include "backend/kernel_source.h"
 #include "backend/loader.h"
 #include "base/error.h"
-#include "catch.h"
 #include "base/temporary_folder.h"
+#include "catch.h"
 #include "kernel/dialect/bits_version.h"
+#include "scoped_variable.h"
 
 #include <unistd.h>
 
@@ -21,26 +22,6 @@ using crt::TemporaryFolder;
 namespace fs = std::filesystem;
 
 namespace {
-
-/// Sets an environment variable, or removes it, until the end of the scope.
-class ScopedVariable {
-public:
-    ScopedVariable(const char* name, std::optional<std::string> value) : name_(name) {
-        if (const char* old = std::getenv(name)) old_ = old;
-        set(value);
-    }
-    ~ScopedVariable() { set(old_); }
-    ScopedVariable(const ScopedVariable&) = delete;
-    ScopedVariable& operator=(const ScopedVariable&) = delete;
-
-private:
-    void set(const std::optional<std::string>& value) {
-        if (value) ::setenv(name_, value->c_str(), 1);
-        else ::unsetenv(name_);
-    }
-    const char* name_;
-    std::optional<std::string> old_;
-};
 
 /// The sentence with which loading (and probing) a backend is refused; empty when it is not.
 std::string refusal(const std::string& name) {

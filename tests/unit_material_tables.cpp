@@ -1,17 +1,26 @@
 // The tables that are made of materials before rendering: each once, the same in any company, and not more
 // than a scene may ask for.
 #include "base/memo.h"
+#include "base/program_identity.h"
+#include "base/temporary_folder.h"
 #include "catch.h"
-#include "compile/compile.h"
-#include "compile/compensation.h"
 #include "compile/coat.h"
+#include "compile/compensation.h"
+#include "compile/compile.h"
 #include "compile/materials.h"
+#include "compile/table_store.h"
+#include "file_bytes.h"
 #include "scene/yaml/scene_yaml.h"
+#include "scoped_variable.h"
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <ctime>
+#include <filesystem>
+#include <fstream>
+#include <functional>
 
 using namespace crt;
 
@@ -89,6 +98,7 @@ TEST_CASE("tables of equal materials cost once, and all of them something", "[co
 }
 
 TEST_CASE("a table does not depend on what else is made", "[compile][materials]") {
+    const ScopedVariable no_folder("CRT_CACHE_DIR", "/dev/null");
     const std::vector<Material> materials = oneOfEach();
     std::vector<const Material*> twice = addressesOf(materials);
     const std::vector<Material> copies = materials;
@@ -142,6 +152,7 @@ TEST_CASE("a memo makes what it does not hold, once, and holds no more than it m
 }
 
 TEST_CASE("tables that are kept are those that would be made", "[compile][materials]") {
+    const ScopedVariable no_folder("CRT_CACHE_DIR", "/dev/null");
     const std::vector<Material> materials = oneOfEach();
     // Differs from another one in a single input.
     std::vector<Material> others = materials;
@@ -166,6 +177,107 @@ TEST_CASE("tables that are kept are those that would be made", "[compile][materi
     }
     CHECK(differing == 2);
     for (const auto& [key, coat] : made.coats) CHECK(beside.coats.at(key).albedo == coat.albedo);
+}
+
+namespace {
+
+/// All numbers of the tables of oneOfEach(), which the process has forgotten.
+std::vector<double> numbersOfNewTables() {
+    forgetLossTables();
+    forgetCoats();
+    const std::vector<Material> materials = oneOfEach();
+    const MaterialTables tables = materialTablesOf(addressesOf(materials));
+    std::vector<double> numbers;
+    for (const LossTable& table : tables.compensations.tables)
+        numbers.insert(numbers.end(), table.rows.begin(), table.rows.end());
+    for (const auto& [key, coat] : tables.coats) {
+        for (std::size_t i = 0; i < kSpectrumSize; ++i) numbers.push_back(coat.albedo[i]);
+        numbers.push_back(coat.internal_reflectance);
+    }
+    return numbers;
+}
+
+/// A folder for tables, which is this process's cache.
+struct TableFolder {
+    TemporaryFolder folder;
+    ScopedVariable variable{"CRT_CACHE_DIR", folder.path()};
+
+    std::vector<std::filesystem::path> files() const {
+        std::vector<std::filesystem::path> all;
+        for (const auto& entry : std::filesystem::directory_iterator(folder.path()))
+            all.push_back(entry.path());
+        return all;
+    }
+};
+
+}  // namespace
+
+TEST_CASE("tables of materials on disk are read by the next run", "[compile][materials][cache]") {
+    REQUIRE(buildId().size() >= 16);
+    const TableFolder cache;
+    const std::vector<double> made = numbersOfNewTables();
+    // Four of losses, and three of coats: the smooth plastic has none.
+    REQUIRE(cache.files().size() == 7);
+    CHECK(numbersOfNewTables() == made);
+
+    // A table that would not be made is there: so it was read.
+    SpectrumValues::Array planted{};
+    planted.fill(0.25);
+    {
+        TableStore store;
+        store.store("albedos of coats", {1.6, 0.2}, &planted, sizeof planted);
+        CHECK(cache.files().size() == 7);
+    }
+    const std::vector<double> read = numbersOfNewTables();
+    CHECK(read != made);
+    CHECK(std::count(read.begin(), read.end(), 0.25) >= static_cast<std::ptrdiff_t>(kSpectrumSize));
+    // Kind and inputs say which table a file holds.
+    CHECK(TableStore().path("a", {1, 2}) == TableStore().path("a", {1, 2}));
+    CHECK(TableStore().path("a", {1, 2}) != TableStore().path("b", {1, 2}));
+    CHECK(TableStore().path("a", {1, 2}) != TableStore().path("a", {2, 1}));
+    // One of another size is made again, and replaced.
+    TableStore().store("albedos of coats", {1.6, 0.2}, &planted, sizeof planted - 8);
+    CHECK(numbersOfNewTables() == made);
+    CHECK(numbersOfNewTables() == made);
+    // Nothing is kept where there is no folder.
+    const ScopedVariable no_folder("CRT_CACHE_DIR", "/dev/null");
+    CHECK(TableStore().path("albedos of coats", {1.6, 0.2}).empty());
+    CHECK(numbersOfNewTables() == made);
+}
+
+TEST_CASE("tables of materials on disk that are damaged or of others are made again",
+          "[compile][materials][cache]") {
+    namespace fs = std::filesystem;
+    const TableFolder cache;
+    const std::vector<double> made = numbersOfNewTables();
+    const auto change = [](const fs::path& file, const std::function<void(std::string&)>& edit) {
+        std::string bytes = slurp(file);
+        edit(bytes);
+        std::ofstream(file, std::ios::binary) << bytes;
+    };
+    const std::vector<std::function<void(const fs::path&)>> faults{
+        [&](const fs::path& f) { change(f, [](std::string& bytes) { bytes[bytes.size() - 5] ^= 64; }); },
+        [&](const fs::path& f) { change(f, [](std::string& bytes) { bytes.resize(bytes.size() / 2); }); },
+        [&](const fs::path& f) { change(f, [](std::string& bytes) { bytes.clear(); }); },
+        [&](const fs::path& f) { change(f, [](std::string& bytes) { bytes[9] ^= 1; }); },
+        [](const fs::path& f) { fs::permissions(f, fs::perms::others_write, fs::perm_options::add); },
+        [](const fs::path& f) {
+            fs::remove(f);
+            fs::create_directory(f);
+        },
+    };
+    for (const auto& fault : faults) {
+        for (const fs::path& file : cache.files()) fault(file);
+        CHECK(numbersOfNewTables() == made);
+    }
+    // A table of another name is that of other inputs, or of another build.
+    for (const fs::path& file : cache.files()) fs::remove_all(file);
+    CHECK(numbersOfNewTables() == made);
+    const std::vector<fs::path> files = cache.files();
+    for (std::size_t i = 0; i < files.size(); ++i) fs::rename(files[i], files[i].string() + ".away");
+    for (std::size_t i = 0; i < files.size(); ++i)
+        fs::rename(files[i].string() + ".away", files[(i + 1) % files.size()]);
+    CHECK(numbersOfNewTables() == made);
 }
 
 TEST_CASE("tables that take too long are refused with the place and what allows them",

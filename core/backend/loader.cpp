@@ -2,6 +2,7 @@
 
 #include "backend/crt_layout_hash.h"
 #include "backend/kernel_source.h"
+#include "base/cache_folder.h"
 #include "base/code_trust.h"
 #include "base/error.h"
 #include "base/log.h"
@@ -201,44 +202,6 @@ std::string trustedFile(const std::string& name, const std::string& path) {
     return judged.path;
 }
 
-/// Existing and usable, made if need be; empty with a debug message otherwise.
-std::string cacheDirectory() {
-    const auto variable = [](const char* name) -> std::string {
-        const char* value = std::getenv(name);
-        return value != nullptr ? value : "";
-    };
-    std::string directory = variable("CRT_CACHE_DIR");
-    if (directory.empty()) {
-        // The XDG standard has relative paths ignored.
-        const std::string base = variable("XDG_CACHE_HOME");
-        if (!base.empty() && base.front() == '/') directory = base + "/crt";
-    }
-    if (directory.empty()) {
-        const std::string home = variable("HOME");
-        if (!home.empty()) directory = home + "/.cache/crt";
-    }
-    if (directory.empty()) {
-        logDebug("no kernel cache: none of CRT_CACHE_DIR, XDG_CACHE_HOME and HOME is set");
-        return {};
-    }
-    std::error_code failed;
-    if (fs::create_directories(directory, failed)) {
-        // Cached kernels are executed, so no other user may have write access there.
-        fs::permissions(directory, fs::perms::owner_all, failed);
-    }
-    if (::access(directory.c_str(), R_OK | W_OK | X_OK) != 0 || !fs::is_directory(directory, failed)) {
-        logDebug("no kernel cache: {} is not a directory that can be written to", directory);
-        return {};
-    }
-    struct stat status {};
-    if (::stat(directory.c_str(), &status) != 0) return {};
-    if (const std::string why = trust::whyNot(status, directory); !why.empty()) {
-        logWarning("no kernel cache, so every process compiles its kernels: {}", why);
-        return {};
-    }
-    return directory;
-}
-
 /// The text at an address that stays valid: a host table may be copied and outlive its maker.
 const char* keep(const std::string& text) {
     static std::mutex mutex;
@@ -418,7 +381,7 @@ CrtHost makeHost(bool use_cache) {
     host.progress = hostProgress;
     host.kernel_source = hostKernelSource;
     if (use_cache) {
-        const std::string directory = cacheDirectory();
+        const std::string directory = cacheFolder();
         if (!directory.empty()) host.cache_directory = keep(directory);
     }
     return host;

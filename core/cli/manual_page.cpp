@@ -92,7 +92,8 @@ constexpr std::array kVariables{
              "The Python that makes the pages of converge and verify, instead of python3; empty: make no "
              "pages."},
     Variable{"CRT_CACHE_DIR",
-             "The folder for compiled kernels, instead of crt in $XDG_CACHE_HOME or ~/.cache."},
+             "The folder for compiled kernels and tables of materials, instead of crt in $XDG_CACHE_HOME or "
+             "~/.cache."},
     Variable{"CRT_KERNEL_DIR", "Kernel headers to be compiled instead of those in the program."},
     Variable{"CRT_OPENCL_WAVES",
              "1: OpenCL renders scenes of many materials on a processor as it does on a GPU, for tests."},

@@ -4,6 +4,7 @@
 #include "base/memo.h"
 #include "base/parallel.h"
 #include "compile/reflectance.h"
+#include "compile/table_store.h"
 #include "compile/visible_normals.h"
 #include "kernel/materials/bsdf.h"
 
@@ -71,15 +72,22 @@ void forCoats(const std::vector<const Material*>& materials, const Add& add) {
 
 /// The albedos of coats that are not smooth.
 std::vector<SpectrumValues::Array> makeAlbedos(const std::vector<CoatKey>& keys) {
+    constexpr const char* kKind = "albedos of coats";
     std::vector<SpectrumValues::Array> albedos(keys.size());
-    parallelFor(keys.size() * kSpectrumSize, 16, [&](std::size_t first, std::size_t end) {
+    std::vector<std::size_t> missing;
+    TableStore store;
+    for (std::size_t k = 0; k < keys.size(); ++k)
+        if (!store.load(kKind, {keys[k].first, keys[k].second}, &albedos[k], sizeof albedos[k]))
+            missing.push_back(k);
+    parallelFor(missing.size() * kSpectrumSize, 16, [&](std::size_t first, std::size_t end) {
         for (std::size_t n = first; n < end; ++n) {
-            const CoatKey& key = keys[n / kSpectrumSize];
-            const std::size_t i = n % kSpectrumSize;
-            albedos[n / kSpectrumSize][i] =
-                coatAlbedo(std::max(static_cast<double>(i) / kCoatCells, 1e-4), key.first, alphaOf(key));
+            const std::size_t k = missing[n / kSpectrumSize], i = n % kSpectrumSize;
+            albedos[k][i] = coatAlbedo(std::max(static_cast<double>(i) / kCoatCells, 1e-4), keys[k].first,
+                                       alphaOf(keys[k]));
         }
     });
+    for (const std::size_t k : missing)
+        store.store(kKind, {keys[k].first, keys[k].second}, &albedos[k], sizeof albedos[k]);
     return albedos;
 }
 

@@ -4,6 +4,7 @@
 #include "base/memo.h"
 #include "base/parallel.h"
 #include "compile/reflectance.h"
+#include "compile/table_store.h"
 #include "compile/visible_normals.h"
 #include "kernel/materials/bsdf.h"
 
@@ -219,20 +220,33 @@ void finish(const Draft& plan, std::vector<float>& rows) {
                               plan.key.narrowing);
 }
 
-std::vector<LossTable> makeLossTables(const std::vector<LossPlan>& wanted) {
+/// The inputs of a table as the store takes them.
+std::vector<double> inputsOf(const LossPlan& plan) {
+    const auto& [key, across] = plan;
+    std::vector<double> inputs{key.refracts ? 1.0 : 0.0,
+                               key.least,
+                               key.most,
+                               key.textured ? 1.0 : 0.0,
+                               key.roughness,
+                               key.narrowing,
+                               across.first,
+                               across.step};
+    for (const Interface& i : across.interfaces)
+        inputs.insert(inputs.end(), {i.index, i.film_index, i.film_rounds});
+    return inputs;
+}
+
+/// Computes the rows of tables.
+void fill(const std::vector<Draft>& plans, const std::vector<std::size_t>& missing,
+          std::vector<LossTable>& tables) {
     struct Work {
         const Row* row;
         float* values;
     };
-    const std::vector<Draft> plans(wanted.begin(), wanted.end());
-    std::vector<LossTable> tables(plans.size());
     std::vector<Work> work;
-    for (std::size_t t = 0; t < plans.size(); ++t) {
-        tables[t].record = plans[t].record;
-        tables[t].rows.assign(plans[t].rows.size() * kStride, 0);
+    for (const std::size_t t : missing)
         for (std::size_t i = 0; i < plans[t].rows.size(); ++i)
             work.push_back({&plans[t].rows[i], tables[t].rows.data() + i * kStride});
-    }
     parallelFor(work.size() * (kLossSteps + 1), 8, [&](std::size_t first, std::size_t end) {
         for (std::size_t n = first; n < end; ++n) {
             const auto& [row, values] = work[n / (kLossSteps + 1)];
@@ -241,9 +255,28 @@ std::vector<LossTable> makeLossTables(const std::vector<LossPlan>& wanted) {
             values[i] = static_cast<float>(row->loss(std::max(t * t, 1e-6)));
         }
     });
-    parallelFor(plans.size(), 1, [&](std::size_t first, std::size_t end) {
-        for (std::size_t t = first; t < end; ++t) finish(plans[t], tables[t].rows);
+    parallelFor(missing.size(), 1, [&](std::size_t first, std::size_t end) {
+        for (std::size_t m = first; m < end; ++m) finish(plans[missing[m]], tables[missing[m]].rows);
     });
+}
+
+std::vector<LossTable> makeLossTables(const std::vector<LossPlan>& wanted) {
+    constexpr const char* kKind = "losses of microfacets";
+    const std::vector<Draft> plans(wanted.begin(), wanted.end());
+    std::vector<LossTable> tables(plans.size());
+    std::vector<std::size_t> missing;
+    TableStore store;
+    for (std::size_t t = 0; t < plans.size(); ++t) {
+        std::vector<float>& rows = tables[t].rows;
+        tables[t].record = plans[t].record;
+        rows.resize(plans[t].rows.size() * kStride);
+        if (!store.load(kKind, inputsOf(wanted[t]), rows.data(), rows.size() * sizeof(float)))
+            missing.push_back(t);
+    }
+    fill(plans, missing, tables);
+    for (const std::size_t t : missing)
+        store.store(kKind, inputsOf(wanted[t]), tables[t].rows.data(),
+                    tables[t].rows.size() * sizeof(float));
     return tables;
 }
 

@@ -1,17 +1,15 @@
-// The image module for EXR, through OpenImageIO, behind image_module.h. Built as a separate library; nothing
-// else in crt includes OpenImageIO.
-#include "image/image_headers.h"
+// The image module that reads EXR, through OpenImageIO, behind image_module.h. Built as a separate library;
+// nothing else in crt includes OpenImageIO.
+#include "image/exr_header.h"
+#include "image/image_bounds.h"
 #include "image/image_module.h"
 #include "image/module_support.h"
 
-#include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <cstdio>
-#include <cstdlib>
 #include <cstring>
 #include <exception>
 #include <memory>
@@ -20,177 +18,17 @@
 #include <utility>
 #include <vector>
 
-#include <fcntl.h>
-#include <unistd.h>
-
 namespace {
 
 using namespace crt::image;
 using OIIO::ImageInput;
-using OIIO::ImageOutput;
 using OIIO::ImageSpec;
 using OIIO::TypeDesc;
-
-/// Metadata that readers expect as a number; everything else is text.
-constexpr const char* kFloatAttributes[] = {"renderTimeSeconds", "utcOffset"};
-constexpr const char* kIntAttributes[] = {"samplesPerPixel"};
-
-template <class Names>
-bool contains(const Names& names, const char* name) {
-    return std::any_of(std::begin(names), std::end(names),
-                       [name](const char* n) { return std::strcmp(n, name) == 0; });
-}
 
 /// OpenImageIO's own words, or ours when it has none.
 std::string wordsOr(std::string words, const char* otherwise) {
     while (!words.empty() && (words.back() == '\n' || words.back() == ' ')) words.pop_back();
     return words.empty() ? otherwise : words;
-}
-
-void addMetadata(ImageSpec& spec, const CrtImageText* metadata, std::uint32_t count) {
-    for (std::uint32_t i = 0; i < count; ++i) {
-        const char* name = metadata[i].name;
-        const char* value = metadata[i].value;
-        if (contains(kFloatAttributes, name)) {
-            spec.attribute(name, std::strtof(value, nullptr));
-        } else if (contains(kIntAttributes, name)) {
-            spec.attribute(
-                name, static_cast<int>(std::min<long long>(std::strtoll(value, nullptr, 10), 0x7fffffff)));
-        } else {
-            spec.attribute(name, value);
-        }
-    }
-}
-
-/// A file for OpenImageIO to write to that remembers the first failure. Left to itself the library writes
-/// through a buffer, and what the last flush of it could not write, on a full disk, it does not say: the
-/// image would be cut off in silence.
-class CheckedFile final : public OIIO::Filesystem::IOProxy {
-public:
-    explicit CheckedFile(const char* path)
-        : IOProxy(path, Write), descriptor_(::open(path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666)) {
-        if (descriptor_ < 0) error_number_ = errno;
-    }
-    ~CheckedFile() override { CheckedFile::close(); }
-    CheckedFile(const CheckedFile&) = delete;
-    CheckedFile& operator=(const CheckedFile&) = delete;
-
-    const char* proxytype() const override { return "crt"; }
-    bool opened() const override { return descriptor_ >= 0; }
-    void close() override {
-        if (descriptor_ >= 0 && ::close(descriptor_) != 0 && error_number_ == 0) error_number_ = errno;
-        descriptor_ = -1;
-    }
-    bool seek(std::int64_t offset) override {
-        m_pos = offset;
-        return offset >= 0;
-    }
-    std::size_t write(const void* bytes, std::size_t size) override {
-        const std::size_t written = pwrite(bytes, size, m_pos);
-        m_pos += static_cast<std::int64_t>(written);
-        return written;
-    }
-    std::size_t pwrite(const void* bytes, std::size_t size, std::int64_t offset) override {
-        std::size_t done = 0;
-        while (done < size) {
-            const ssize_t n = ::pwrite(descriptor_, static_cast<const char*>(bytes) + done, size - done,
-                                       offset + static_cast<std::int64_t>(done));
-            if (n < 0 && errno == EINTR) continue;
-            if (n < 0 && error_number_ == 0) error_number_ = errno;
-            if (n <= 0) break;
-            done += static_cast<std::size_t>(n);
-        }
-        return done;
-    }
-    void flush() const override {}
-
-    void requireNoFailure() const {
-        if (error_number_ != 0) throw Failure{std::strerror(error_number_)};
-    }
-
-private:
-    int descriptor_ = -1;
-    int error_number_ = 0;
-};
-
-void write(const char* path, const ImageSpec& spec, const TypeDesc& type, const void* pixels) {
-    CheckedFile file(path);  // Outlives the writer, whose destructor may still write.
-    file.requireNoFailure();
-    const std::unique_ptr<ImageOutput> output = ImageOutput::create("exr");
-    if (!output) throw Failure{wordsOr(OIIO::geterror(), "this OpenImageIO was built without the format")};
-    output->set_ioproxy(&file);
-    try {
-        if (!output->open(path, spec))
-            throw Failure{wordsOr(output->geterror(), "the file cannot be opened")};
-        if (!output->write_image(type, pixels))
-            throw Failure{wordsOr(output->geterror(), "the pixels cannot be written")};
-        if (!output->close()) throw Failure{wordsOr(output->geterror(), "the file cannot be completed")};
-    } catch (const std::exception&) {
-        file.requireNoFailure();  // The error of the disk is more precise than that of the library.
-        throw;
-    }
-    file.close();
-    file.requireNoFailure();
-}
-
-std::int32_t writeExr(const char* path, const CrtImagePlanes* image, char* reason,
-                      std::uint32_t reason_size) {
-    return guarded(reason, reason_size, [&] {
-        const std::uint32_t floats = image->float_channel_count, integers = image->integer_channel_count;
-        ImageSpec spec(static_cast<int>(image->width), static_cast<int>(image->height),
-                       static_cast<int>(floats + integers), TypeDesc::FLOAT);
-        spec.channelnames.clear();
-        spec.channelformats.clear();
-        for (std::uint32_t c = 0; c < floats; ++c) {
-            spec.channelnames.emplace_back(image->float_channels[c]);
-            spec.channelformats.emplace_back(TypeDesc::FLOAT);
-        }
-        for (std::uint32_t c = 0; c < integers; ++c) {
-            spec.channelnames.emplace_back(image->integer_channels[c]);
-            spec.channelformats.emplace_back(TypeDesc::UINT32);
-        }
-        if (integers == 0) spec.channelformats.clear();
-        for (std::size_t c = 0; c < spec.channelnames.size(); ++c) {
-            if (spec.channelnames[c] == "Z") spec.z_channel = static_cast<int>(c);
-            if (spec.channelnames[c] == "A") spec.alpha_channel = static_cast<int>(c);
-        }
-        spec.x = image->left;
-        spec.y = image->top;
-        if (image->whole_width > 0) {
-            spec.full_width = static_cast<int>(image->whole_width);
-            spec.full_height = static_cast<int>(image->whole_height);
-        }
-        spec.attribute("compression", "zip");
-        if (image->chromaticities != nullptr)
-            spec.attribute("chromaticities", TypeDesc(TypeDesc::FLOAT, 8), image->chromaticities);
-        if (image->world_to_camera != nullptr)
-            spec.attribute("worldToCamera", TypeDesc::TypeMatrix, image->world_to_camera);
-        if (image->world_to_ndc != nullptr)
-            spec.attribute("worldToNDC", TypeDesc::TypeMatrix, image->world_to_ndc);
-        if (image->adopted_neutral != nullptr)
-            spec.attribute("adoptedNeutral", TypeDesc(TypeDesc::FLOAT, TypeDesc::VEC2),
-                           image->adopted_neutral);
-        if (image->white_luminance_cd_m2 > 0)
-            spec.attribute("whiteLuminance", image->white_luminance_cd_m2);
-        // Left to itself the library stamps the present time on every EXR, and the same image would never be
-        // the same file.
-        spec.attribute("DateTime", "");
-        addMetadata(spec, image->metadata, image->metadata_count);
-
-        // "Native" pixels, float and integer side by side: handing OpenImageIO floats for a uint32 channel
-        // would scale them by 2^32.
-        const std::size_t pixels = std::size_t{image->width} * image->height;
-        std::vector<unsigned char> packed(pixels * (floats + integers) * 4);
-        unsigned char* next = packed.data();
-        for (std::size_t p = 0; p < pixels; ++p) {
-            if (floats > 0) std::memcpy(next, image->floats + p * floats, floats * 4);
-            next += floats * 4;
-            if (integers > 0) std::memcpy(next, image->integers + p * integers, integers * 4);
-            next += integers * 4;
-        }
-        write(path, spec, integers == 0 ? TypeDesc(TypeDesc::FLOAT) : TypeDesc(TypeDesc::UNKNOWN),
-              packed.data());
-    });
 }
 
 bool isInteger(const ImageSpec& spec, int channel) {
@@ -401,7 +239,7 @@ extern "C" const CrtImageModule* CRT_IMAGE_MODULE_ENTRY(void) {
     static const CrtImageModule table{sizeof(CrtImageModule),
                                       0,
                                       "OpenImageIO " OIIO_VERSION_STRING,
-                                      writeExr,
+                                      nullptr,
                                       nullptr,
                                       readImage,
                                       freeImage,

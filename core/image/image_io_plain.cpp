@@ -1,11 +1,12 @@
 // The image module for formats that small libraries or crt itself read: PNG through libpng, JPEG through
 // libjpeg-turbo, sound PNG files that are textures through libdeflate, Radiance HDR and TGA by readers of
 // crt's own, behind image_module.h. Nothing else in crt uses these libraries.
-#include "image/image_headers.h"
+#include "image/image_bounds.h"
 #include "image/image_module.h"
 #include "image/jpeg_reader.h"
 #include "image/module_support.h"
 #include "image/png_codec.h"
+#include "image/png_header.h"
 #include "image/png_reader.h"
 #include "image/radiance_reader.h"
 #include "image/tga_reader.h"
@@ -106,8 +107,7 @@ std::int32_t readImage(const char* path, std::uint64_t most_bytes, const CrtImag
             // TIFF and JPEG hold no renders to compare; a TGA has no signature.
             throw Failure{
                 "it is not an EXR, PNG, PFM, PPM or Radiance HDR file; OpenImageIO's oiiotool converts "
-                "other "
-                "formats: oiiotool IN -o OUT.exr"};
+                "other formats: oiiotool IN -o OUT.exr"};
         }
         read->whole_width = read->width;
         read->whole_height = read->height;

@@ -1,8 +1,9 @@
 /*
- * image_module.h: the border between crt and its two image codec modules. C99.
+ * image_module.h: the border between crt and its three image codec modules. C99.
  *
  *   lib/crt/crt_image_plain.so   PNG, JPEG, Radiance HDR and TGA, with three small libraries
- *   lib/crt/crt_image_oiio.so    EXR, with OpenImageIO and the 250 libraries that it brings
+ *   lib/crt/crt_image_exr.so     writes EXR, with OpenEXR
+ *   lib/crt/crt_image_oiio.so    reads EXR, with OpenImageIO and the 250 libraries that it brings
  *
  * Only a job that reads or writes such a file pays for them.
  *
@@ -20,7 +21,8 @@ extern "C" {
 #endif
 
 #define CRT_IMAGE_PLAIN_FILE "crt_image_plain.so"
-#define CRT_IMAGE_EXR_FILE "crt_image_oiio.so"
+#define CRT_IMAGE_EXR_WRITER_FILE "crt_image_exr.so"
+#define CRT_IMAGE_EXR_READER_FILE "crt_image_oiio.so"
 /* The symbol carries the version: a module of another version does not have it. */
 #define CRT_IMAGE_MODULE_ENTRY crt_image_module_v7
 #define CRT_IMAGE_MODULE_ENTRY_NAME "crt_image_module_v7"
@@ -86,10 +88,11 @@ typedef struct CrtImageModule {
     uint32_t reserved;
     /* The library behind it, e.g. "OpenImageIO 2.4.7". */
     const char *build;
-    /* Null in the module of other formats. Every float channel as float, every integer channel as uint32,
-     * zip compressed. The file name need not end in .exr. */
+    /* Null in other modules; the module that has it reads nothing, and its other functions are null. Every
+       float channel as float, every integer channel as uint32, zip compressed. The file name need not end in
+       .exr. */
     int32_t (*write_exr)(const char *path, const CrtImagePlanes *image, char *reason, uint32_t reason_size);
-    /* Null in the module of EXR. 8-bit RGB, sRGB-encoded, interleaved. */
+    /* Null in the modules of EXR. 8-bit RGB, sRGB-encoded, interleaved. */
     int32_t (*write_png)(const char* path, uint32_t width, uint32_t height, const uint8_t* rgb,
                          const CrtImageText* metadata, uint32_t metadata_count, char* reason,
                          uint32_t reason_size);
@@ -99,8 +102,7 @@ typedef struct CrtImageModule {
                     uint32_t reason_size);
     void (*free_image)(const CrtImagePlanes *image);
     /* EXR, or PNG, Radiance HDR, JPEG and TGA, by content. *info is filled in; with a buffer, which must
-       have
-       the bytes that an earlier *info says, [height][width][channels], too. */
+       have the bytes that an earlier *info says, [height][width][channels], too. */
     int32_t (*read_texels)(const char *path, CrtTexelsInfo *info, void *buffer, uint64_t buffer_bytes,
                            char *reason, uint32_t reason_size);
     /* The same of alpha: one channel, or none (info->channels is 0) where all of the image is there. */

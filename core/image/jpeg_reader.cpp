@@ -2,7 +2,7 @@
 
 #include "image/exif_orientation.h"
 #include "image/icc_profile.h"
-#include "image/image_headers.h"
+#include "image/image_bounds.h"
 
 #include <csetjmp>
 #include <cstdio>

@@ -79,8 +79,13 @@ const CrtImageModule& imageModule(ModuleFormat format, const std::string& path, 
         return *opened.table;
     };
     if (format == ModuleFormat::Exr) {
-        static const Opened exr = open(CRT_IMAGE_EXR_FILE);
-        return require(exr, ".png, .pfm and .ppm");
+        constexpr const char* kOthers = ".png, .pfm and .ppm";
+        if (kind == ErrorKind::Output) {
+            static const Opened writer = open(CRT_IMAGE_EXR_WRITER_FILE);
+            return require(writer, kOthers);
+        }
+        static const Opened reader = open(CRT_IMAGE_EXR_READER_FILE);
+        return require(reader, kOthers);
     }
     static const Opened plain = open(CRT_IMAGE_PLAIN_FILE);
     return require(plain, ".exr, .pfm and .ppm");

@@ -15,13 +15,13 @@ enum class ModuleFormat { Plain, Exr };
 /// By the first bytes of a file.
 ModuleFormat moduleFormatOf(const std::string& path);
 
-/// Opens the module on first use and keeps it: OpenImageIO's threads outlive any one image. Throws
-/// crt::Error(kind), with the name of the file that is to be written (kind Output) or read, when there is
-/// none.
+/// Opens the module that writes a format (kind Output), or the one that reads it, on first use, and keeps
+/// it: threads of its libraries outlive any one image. Throws crt::Error(kind), with the name of the file,
+/// when there is none.
 const CrtImageModule& imageModule(ModuleFormat format, const std::string& path, ErrorKind kind);
 
-/// Opens it beforehand, where writing such a file needs it: its hundreds of libraries take a fifth of a
-/// second. Errors are reported when the file is written. [any thread]
+/// Opens it beforehand, where writing such a file needs it: at the end of a render memory may be short.
+/// Errors are reported when the file is written. [any thread]
 void prepareToWrite(OutputFormat format) noexcept;
 
 }  // namespace crt

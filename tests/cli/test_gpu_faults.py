@@ -372,7 +372,7 @@ class KernelCaches(FakeGpuTest):
         self.assert_rendered("a cached kernel is refused", "belongs to another user")
         self.assert_rendered(from_cache=True)
         os.chown(self.path("cache"), 65534, 65534)
-        self.assert_rendered("no kernel cache, so every process compiles its kernels")
+        self.assert_rendered("crt keeps no kernels and no tables of materials")
 
     def test_what_others_may_write_to_is_not_run(self):
         (kernel,) = self.kernels()
@@ -380,7 +380,7 @@ class KernelCaches(FakeGpuTest):
         self.assert_rendered("a cached kernel is refused")
         self.assert_rendered(from_cache=True)
         os.chmod(self.path("cache"), 0o777)
-        self.assert_rendered("no kernel cache, so every process compiles its kernels")
+        self.assert_rendered("crt keeps no kernels and no tables of materials")
 
     def test_no_folder_can_be_made(self):
         self.write("file", "")

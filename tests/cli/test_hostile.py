@@ -1206,7 +1206,7 @@ def environment_cases():
     with_variable(
         "a cache folder that everyone can write to",
         0,
-        "no kernel cache, so every process compiles its kernels: everyone can write",
+        "so every process makes its own: everyone can write",
         shared_cache,
         CRT_CACHE_DIR="cache",
     )

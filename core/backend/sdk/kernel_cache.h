@@ -1,9 +1,5 @@
-/// Disk cache of compiled kernels, for backends that compile while they run. Content-addressed: the key is a
-/// hash of everything that decides the binary, so an entry is never stale and nothing has to be invalidated.
-///
-/// A cache must never make anything fail: a damaged, foreign or unreadable entry is an absent one, and an
-/// entry that cannot be written is not written. Any number of processes and threads may share one directory.
-/// Uses nothing of the core but this header.
+/// Disk cache of compiled kernels, for backends that compile while they run: base/file_cache.h for plugins.
+/// The header uses nothing of the core.
 #pragma once
 
 #include <array>
@@ -49,8 +45,6 @@ public:
     std::string path(const Key& key) const;
 
 private:
-    void evict() const;
-
     std::string directory_;
     std::uint64_t max_bytes_;
 };

@@ -1,13 +1,9 @@
-/// Headers of EXR and PNG files, walked before their libraries see them: both allocate what a damaged file
-/// says, up to gigabytes for each attribute or chunk, and learn only then that the file ends. Part of the
-/// image module (image_module.h).
+/// Limits on what the header of an image file may say, asked before anything is allocated. Part of the image
+/// modules (image_module.h).
 #pragma once
-
-#include "image/image_module.h"
 
 #include <cstdint>
 #include <stdexcept>
-#include <string>
 
 namespace crt::image {
 
@@ -16,13 +12,11 @@ struct DamagedHeader : std::runtime_error {
     using std::runtime_error::runtime_error;
 };
 
-/// Throws DamagedHeader unless attributes have the sizes that their types say and lie within the file, and
-/// its pixels may.
-void checkExrHeader(const std::string& path);
-/// Throws DamagedHeader unless every chunk lies within the file, and its pixels may.
-void checkPngHeader(const std::string& path);
-/// The tags in the chunks of a PNG that checkPngHeader() has checked.
-CrtUnappliedTags tagsOfPng(const std::string& path);
+/// The most bytes that one byte of Deflate expands to: two bits repeat 258 bytes.
+constexpr double kDeflateBytesAByte = 1032;
+
+/// Throws DamagedHeader when pixels of `bytes` do not come out of a file that holds `most_bytes` at most.
+void requireRoom(std::uint64_t width, std::uint64_t height, double bytes, double most_bytes);
 /// Throws DamagedHeader when there are no pixels, or decoded they would take more than `most_bytes`.
 void checkMemory(std::uint64_t width, std::uint64_t height, std::uint64_t bytes_a_pixel,
                  std::uint64_t most_bytes);
@@ -31,8 +25,7 @@ void checkMemory(std::uint64_t width, std::uint64_t height, std::uint64_t bytes_
 inline constexpr std::uint64_t kStripRows = 64;
 /// Throws DamagedHeader if this number of rows would take more than a gigabyte, and more than the image.
 void checkRows(std::uint64_t width, std::uint64_t height, std::uint64_t bytes_a_pixel);
-
-/// Throws DamagedHeader if a file holds far more channels than are read: OpenEXR decodes all of them.
+/// Throws DamagedHeader if a file holds far more channels than are read: all of them are decoded.
 void checkChannels(std::uint64_t pixels, std::uint64_t bytes_a_pixel, std::uint64_t channels,
                    std::uint64_t bytes_read_a_pixel);
 
