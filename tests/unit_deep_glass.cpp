@@ -76,3 +76,34 @@ TEST_CASE("spheres of glass have two surfaces each", "[deep-glass]") {
     CHECK(found->share < 1);
     CHECK_FALSE(deepGlass(slabs(0, 12, balls)));
 }
+
+TEST_CASE("rays meet glass anywhere in the view, and it alone", "[deep-glass]") {
+    // Slabs from the middle of the view to its corner, seen from 0, 0, 0: 64 of 256 rays. In each corner.
+    for (const double x : {-1.0, 1.0})
+        for (const double y : {-1.0, 1.0}) {
+            std::string stack;
+            for (int i = 0; i < 9; ++i)
+                stack += fmt::format(
+                    "  - {{box: {{size: [9, 9, 0.2]}}, material: glass, "
+                    "transform: [{{translate: [{}, {}, {}]}}]}}\n",
+                    0.01 + 4.501 * x, 0.02 + 4.501 * y, 2 + i);
+            const std::optional<DeepGlass> found = deepGlass(slabs(0, 16, stack));
+            REQUIRE(found);
+            CHECK(found->share == 0.25);
+            CHECK(found->surfaces == 18);
+        }
+    // Around the camera, so that triangles cross its plane: one surface each. Behind it there is none.
+    std::string shells, behind;
+    for (int i = 0; i < 9; ++i) {
+        shells += fmt::format("  - {{box: {{size: [{0}, {0}, {0}]}}, material: glass}}\n", 1 + 0.1 * i);
+        behind += fmt::format(
+            "  - {{box: {{size: [9, 9, 0.2]}}, material: glass, "
+            "transform: [{{translate: [0, 0, {}]}}]}}\n",
+            -2 - i);
+    }
+    const std::optional<DeepGlass> around = deepGlass(slabs(0, 8, shells));
+    REQUIRE(around);
+    CHECK(around->share == 1);
+    CHECK(around->surfaces == 9);
+    CHECK_FALSE(deepGlass(slabs(0, 8, behind)));
+}

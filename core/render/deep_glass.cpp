@@ -68,15 +68,13 @@ struct Sight {
 };
 
 /// By Möller and Trumbore (1997).
-void meetTriangle(std::vector<Sight>& sights, Seen seen, const std::array<Vec3d, 3>& corners) {
+void meetRay(Sight& ray, Seen seen, const std::array<Vec3d, 3>& corners) {
     const Vec3d second = corners[1] - corners[0], third = corners[2] - corners[0];
-    for (Sight& ray : sights) {
-        const Vec3d p = cross(ray.along, third), s = ray.from - corners[0], q = cross(s, second);
-        const double det = dot(second, p);
-        const double u = dot(s, p) / det, v = dot(ray.along, q) / det, t = dot(third, q) / det;
-        // The edge between two triangles belongs to one of them, in nearly all cases.
-        if (u >= 0 && v >= 0 && u + v < 1 && t > 0) ray.meet(seen, t);
-    }
+    const Vec3d p = cross(ray.along, third), s = ray.from - corners[0], q = cross(s, second);
+    const double det = dot(second, p);
+    const double u = dot(s, p) / det, v = dot(ray.along, q) / det, t = dot(third, q) / det;
+    // The edge between two triangles belongs to one of them, in nearly all cases.
+    if (u >= 0 && v >= 0 && u + v < 1 && t > 0) ray.meet(seen, t);
 }
 
 void meetSphere(std::vector<Sight>& sights, Seen seen, const Vec3d& centre, double radius) {
@@ -89,13 +87,83 @@ void meetSphere(std::vector<Sight>& sights, Seen seen, const Vec3d& centre, doub
     }
 }
 
-void meetScene(std::vector<Sight>& sights, const Scene& scene) {
+/// The rays through the middles of side × side parts of the view, in rows.
+class View {
+public:
+    View(const Camera& camera, int side)
+        : side_(side),
+          from_(camera.position),
+          ahead_(unit(camera.target - camera.position)),
+          right_(unit(cross(ahead_, camera.up))),
+          above_(cross(right_, ahead_)),
+          width_(camera.tan_half_width),
+          height_(camera.tan_half_height) {
+        for (int y = 0; y < side; ++y)
+            for (int x = 0; x < side; ++x)
+                sights.push_back({from_, unit(ahead_ + right_ * (width_ * ((2 * x + 1.0) / side - 1)) +
+                                              above_ * (height_ * ((2 * y + 1.0) / side - 1)))});
+    }
+
+    void meetTriangle(Seen seen, const std::array<Vec3d, 3>& corners) {
+        const Parts parts = partsOf(corners);
+        for (int y = parts.first[1]; y <= parts.last[1]; ++y)
+            for (int x = parts.first[0]; x <= parts.last[0]; ++x)
+                meetRay(sights[static_cast<std::size_t>(y * side_ + x)], seen, corners);
+    }
+
+    std::vector<Sight> sights;
+
+private:
+    struct Parts {
+        std::array<int, 2> first, last;
+    };
+
+    static Vec3d unit(const Vec3d& v) { return v * (1 / length(v)); }
+
+    /// The parts whose rays may meet a triangle: all if the camera's plane cuts it, or if it is seen so
+    /// nearly from the side that rounding decides which rays meet it.
+    Parts partsOf(const std::array<Vec3d, 3>& corners) const {
+        constexpr double kLeastSine = 1e-9, kRounding = 0.01;  // The latter in parts.
+        const Parts all{{0, 0}, {side_ - 1, side_ - 1}};
+        std::array<std::array<double, 2>, 3> at{};
+        int ahead = 0, behind = 0;
+        for (std::size_t k = 0; k < 3; ++k) {
+            const Vec3d to = corners[k] - from_;
+            const double depth = dot(to, ahead_), least = 1e-6 * length(to);
+            ahead += depth > least;
+            behind += depth < -least;
+            at[k] = {dot(to, right_) / (depth * width_), dot(to, above_) / (depth * height_)};
+        }
+        if (behind == 3) return {{0, 0}, {-1, -1}};
+        if (ahead < 3) return all;
+        const double ax = at[1][0] - at[0][0], ay = at[1][1] - at[0][1], bx = at[2][0] - at[0][0],
+                     by = at[2][1] - at[0][1];
+        const double area = ax * by - ay * bx;
+        if (!(area * area > kLeastSine * kLeastSine * (ax * ax + ay * ay) * (bx * bx + by * by))) return all;
+        Parts parts{};
+        for (std::size_t k = 0; k < 2; ++k) {
+            // Ray x is at (2 x + 1) / side - 1.
+            const auto [least, most] = std::minmax({at[0][k], at[1][k], at[2][k]});
+            const auto part = [&](double place) { return ((place + 1) * side_ - 1) / 2; };
+            parts.first[k] = static_cast<int>(std::ceil(std::max(part(least) - kRounding, 0.0)));
+            parts.last[k] = static_cast<int>(std::floor(std::min(part(most) + kRounding, side_ - 1.0)));
+        }
+        return parts;
+    }
+
+    int side_;
+    Vec3d from_, ahead_, right_, above_;
+    double width_, height_;
+};
+
+void meetScene(View& view, const Scene& scene) {
     for (const Object& object : scene.objects) {
         const Mesh& mesh = scene.meshes[object.mesh];
         for (const Matrix4d& transform : object.transforms) {
             if (object.shape) {
                 if (object.shape->type == QuadricType::Sphere)
-                    meetSphere(sights, seenOf(scene, object.material), transformPoint(transform, {0, 0, 0}),
+                    meetSphere(view.sights, seenOf(scene, object.material),
+                               transformPoint(transform, {0, 0, 0}),
                                object.shape->radius * evenScaleOf(transform).value_or(0));
                 continue;
             }
@@ -103,26 +171,11 @@ void meetScene(std::vector<Sight>& sights, const Scene& scene) {
                 std::array<Vec3d, 3> corners;
                 for (std::size_t k = 0; k < 3; ++k)
                     corners[k] = transformPoint(transform, mesh.positions[mesh.triangles[t][k]]);
-                meetTriangle(sights,
-                             seenOf(scene, mesh.material.empty() ? object.material : mesh.material[t]),
-                             corners);
+                view.meetTriangle(seenOf(scene, mesh.material.empty() ? object.material : mesh.material[t]),
+                                  corners);
             }
         }
     }
-}
-
-/// The rays through the middles of side × side parts of the view.
-std::vector<Sight> sightsOf(const Camera& camera, int side) {
-    const auto unit = [](const Vec3d& v) { return v * (1 / length(v)); };
-    const Vec3d ahead = unit(camera.target - camera.position), right = unit(cross(ahead, camera.up)),
-                above = cross(right, ahead);
-    std::vector<Sight> sights;
-    for (int y = 0; y < side; ++y)
-        for (int x = 0; x < side; ++x)
-            sights.push_back({camera.position,
-                              unit(ahead + right * (camera.tan_half_width * ((2 * x + 1.0) / side - 1)) +
-                                   above * (camera.tan_half_height * ((2 * y + 1.0) / side - 1)))});
-    return sights;
 }
 
 }  // namespace
@@ -135,18 +188,17 @@ std::optional<DeepGlass> deepGlass(const Scene& scene) {
         return std::nullopt;
     const double fitting = std::sqrt(kMostTests / static_cast<double>(countOf(scene, false)));
     if (fitting < kLeastSide) return std::nullopt;
-    std::vector<Sight> sights =
-        sightsOf(scene.camera, static_cast<int>(std::min<double>(fitting, kMostSide)));
-    meetScene(sights, scene);
+    View view(scene.camera, static_cast<int>(std::min<double>(fitting, kMostSide)));
+    meetScene(view, scene);
     DeepGlass found;
     double deep = 0;
-    for (const Sight& sight : sights) {
+    for (const Sight& sight : view.sights) {
         const int surfaces = sight.surfaces();
         if (surfaces + surfaces / 4 + 1 <= depth) continue;
         ++deep;
         found.surfaces = std::max(found.surfaces, surfaces);
     }
-    found.share = deep / static_cast<double>(sights.size());
+    found.share = deep / static_cast<double>(view.sights.size());
     return found.share >= kLeastShare ? std::optional(found) : std::nullopt;
 }
 
