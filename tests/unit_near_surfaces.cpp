@@ -1,7 +1,8 @@
 // Surfaces too near to one another, and lamps in the plane of another surface.
-#include "compiled_scenes.h"
+#include "compile/near_pairs.h"
 #include "compile/near_scene.h"
 #include "compile/near_surfaces.h"
+#include "compiled_scenes.h"
 
 #include "base/error.h"
 
@@ -176,6 +177,7 @@ TEST_CASE("surfaces too near and lamps in a plane are found without a BVH as wit
         CHECK(found.near == expected.near);
         CHECK(found.nearest_clearance == expected.nearest_clearance);
         if (gap == 1.0) CHECK(expected.near == 0);
+        CHECK(crt::mayHaveNearSurfaces(without) == (expected.near > 0));
         // So near that some are found, or the comparison was of nothing.
         if (gap == 1e-6) CHECK(expected.near > 0);
     }
@@ -190,6 +192,7 @@ TEST_CASE("surfaces too near and lamps in a plane are found without a BVH as wit
                                 found = crt::findNearSurfaces(crt::nearScene(without));
         INFO("gap " << gap << ", near " << expected.near << " of " << expected.asked);
         CHECK(found.near == expected.near);
+        CHECK(crt::mayHaveNearSurfaces(without) == (expected.near > 0));
         if (gap == 1e-6) CHECK(expected.near > 0);
     }
 
@@ -205,8 +208,9 @@ TEST_CASE("surfaces too near and lamps in a plane are found without a BVH as wit
     lamp.objects.push_back(lamp.objects[0]);
     lamp.objects.back().mesh = 2;
     const auto with = crt::findCoplanarLight(compiled(lamp));
-    const auto without = crt::findCoplanarLight(
-        crt::nearScene(crt::compileScene(lamp, 0, {.accelerator_reach = kEverywhere})));
+    const CompiledScene without_nodes = crt::compileScene(lamp, 0, {.accelerator_reach = kEverywhere});
+    CHECK(crt::mayHaveNearSurfaces(without_nodes));
+    const auto without = crt::findCoplanarLight(crt::nearScene(without_nodes));
     REQUIRE(with);
     REQUIRE(without);
     CHECK(without->surface == with->surface);

@@ -50,6 +50,16 @@ TriangleBounds boundsOf(const FlatScene& flat, std::size_t id) {
     return b;
 }
 
+TriangleBounds boundsOf(const kernel::CrtTriangle& triangle, float padding) {
+    TriangleBounds b{};
+    for (std::size_t k = 0; k < 3; ++k) {
+        const float* p = triangle.p + 3 * k;
+        b.lower[k] = std::min({p[0], p[1], p[2]}) - padding;
+        b.upper[k] = std::max({p[0], p[1], p[2]}) + padding;
+    }
+    return b;
+}
+
 MeshTrees compileMeshTrees(const FlatScene& flat) {
     MeshTrees trees;
     std::uint32_t slot = static_cast<std::uint32_t>(flat.triangles.size());

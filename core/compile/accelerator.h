@@ -41,5 +41,6 @@ AcceleratorPart compileAccelerator(const Scene& scene, const FlatScene& flat, co
 
 /// Coordinates are those of the compiled scene.
 TriangleBounds boundsOf(const FlatScene& flat, std::size_t id);
+TriangleBounds boundsOf(const kernel::CrtTriangle& triangle, float padding);
 
 }  // namespace crt

@@ -11,9 +11,10 @@
 #include "compile/flatten.h"
 #include "compile/geometry.h"
 #include "compile/instances.h"
-#include "compile/lights.h"
 #include "compile/large_surfaces.h"
+#include "compile/lights.h"
 #include "compile/materials.h"
+#include "compile/near_pairs.h"
 #include "compile/near_scene.h"
 #include "compile/near_surfaces.h"
 #include "compile/needs.h"
@@ -253,10 +254,12 @@ std::string objectOf(const Scene& scene, const CompiledScene& compiled, std::uin
 /// Warns of geometry that single precision cannot tell apart.
 void warnOfNearSurfaces(const Scene& scene, const CompiledScene& compiled) {
     const Stage stage("looking for surfaces too near to each other");
+    // Nearly all scenes without nodes need no search.
+    const bool searches = !compiled.without_nodes || mayHaveNearSurfaces(compiled);
     std::optional<CompiledScene> reduced;
-    if (compiled.without_nodes) reduced = nearScene(compiled);
+    if (searches && compiled.without_nodes) reduced = nearScene(compiled);
     const CompiledScene& searched = reduced ? *reduced : compiled;
-    if (const std::optional<CoplanarLight> found = findCoplanarLight(searched))
+    if (const auto found = searches ? findCoplanarLight(searched) : std::nullopt)
         logWarning(
             "{} lies in the plane of {} and overlaps it: rounding decides which of them is seen, and the "
             "image is wrong there; move the light {:.3g} or more towards the side that it lights, or cut a "
@@ -279,7 +282,7 @@ void warnOfNearSurfaces(const Scene& scene, const CompiledScene& compiled) {
             "(crt divides a mesh that has one placement, does not emit and has no vertex colours)",
             objectOf(scene, compiled, found->surface), found->clearance, found->height,
             100 * found->error, found->error < 0.1 ? 1 : 0);
-    if (scene.integrator.max_depth > 0)
+    if (searches && scene.integrator.max_depth > 0)
         if (const NearSurfaces found = findNearSurfaces(searched); found.near > 0)
             logWarning(
                 "{} of {} triangles looked at have another surface nearer than single precision can tell "

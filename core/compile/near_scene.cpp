@@ -2,6 +2,7 @@
 
 #include "base/log.h"
 #include "base/parallel.h"
+#include "compile/accelerator.h"
 #include "compile/blob_writer.h"
 #include "compile/bvh_build.h"
 #include "compile/near_surfaces.h"
@@ -21,16 +22,6 @@ using kernel::CrtTriangle;
 using kernel::u64;  // CRT_ARRAY computes with it
 
 constexpr std::size_t kSlotsAtOnce = std::size_t{1} << 16;  // of what a thread looks at, at a time
-
-TriangleBounds boundsOf(const CrtTriangle& triangle, float padding) {
-    TriangleBounds b{};
-    for (std::size_t k = 0; k < 3; ++k) {
-        const float* p = triangle.p + 3 * k;
-        b.lower[k] = std::min({p[0], p[1], p[2]}) - padding;
-        b.upper[k] = std::max({p[0], p[1], p[2]}) + padding;
-    }
-    return b;
-}
 
 /// Space within ±1 as cells, some of them marked. Cells share the bits of a hash table, so that an unmarked
 /// one may look marked, never the other way round.

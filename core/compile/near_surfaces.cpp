@@ -203,10 +203,40 @@ CoarseLights findCoarseLights(const CompiledScene& scene) {
     return found;
 }
 
+std::optional<std::array<NormalRay, 2>> normalRays(const kernel::CrtContext& context, std::uint32_t slot,
+                                                   float reach) {
+    using namespace kernel;
+    const auto* triangles = CRT_ARRAY(CrtTriangle, context.blob, context.scene->triangles);
+    const auto* faces = CRT_ARRAY(CrtFace, context.blob, context.scene->faces);
+    const vec3 normal = crt_load3(faces[slot].normal);
+    if (dot3(normal, normal) == 0.0f) return std::nullopt;
+    const vec3 middle =
+        (crt_triangle_vertex(triangles + slot, 0) + crt_triangle_vertex(triangles + slot, 1) +
+         crt_triangle_vertex(triangles + slot, 2)) *
+        (1.0f / 3.0f);
+    const float touching =
+        16 * CRT_EPSILON * std::max({std::abs(middle.x), std::abs(middle.y), std::abs(middle.z)});
+    std::array<NormalRay, 2> rays{};
+    for (std::size_t i = 0; i < 2; ++i) {
+        rays[i].touching = touching;
+        rays[i].ray.d = normal * (i == 0 ? 1.0f : -1.0f);
+        // Begins beyond what touches, among it the triangle itself.
+        rays[i].ray.o = middle + rays[i].ray.d * touching;
+        rays[i].ray.reach = reach;
+    }
+    return rays;
+}
+
+std::optional<float> clearanceBeyond(const kernel::CrtContext& context, std::uint32_t slot,
+                                     const NormalRay& from, const kernel::CrtHit& hit) {
+    const auto* faces = CRT_ARRAY(kernel::CrtFace, context.blob, context.scene->faces);
+    const float clearance = std::max(faces[slot].clearance, faces[hit.slot].clearance);
+    return hit.t + from.touching > clearance ? std::nullopt : std::optional(clearance);
+}
+
 NearSurfaces findNearSurfaces(const CompiledScene& scene) {
     using namespace kernel;
     const CrtContext context = contextOf(scene);
-    const auto* triangles = CRT_ARRAY(CrtTriangle, context.blob, context.scene->triangles);
     const auto* faces = CRT_ARRAY(CrtFace, context.blob, context.scene->faces);
     const u32 count = context.scene->triangle_count;
     const float largest = largestClearance(faces, count);
@@ -218,28 +248,17 @@ NearSurfaces findNearSurfaces(const CompiledScene& scene) {
         if (tests == 0) break;
         const u32 slot = slots[id];
         if (slot == CRT_NONE) continue;
-        const vec3 normal = crt_load3(faces[slot].normal);
-        if (dot3(normal, normal) == 0.0f) continue;  // no area
+        const auto rays = normalRays(context, slot, largest);
+        if (!rays) continue;
         ++found.asked;
-        CrtRay ray;
-        ray.o = (crt_triangle_vertex(triangles + slot, 0) + crt_triangle_vertex(triangles + slot, 1) +
-                 crt_triangle_vertex(triangles + slot, 2)) *
-                (1.0f / 3.0f);
-        const float touching =
-            16 * CRT_EPSILON * std::max({std::abs(ray.o.x), std::abs(ray.o.y), std::abs(ray.o.z)});
-        for (const float side : {1.0f, -1.0f}) {
-            // Begins beyond what touches, among it the triangle itself.
-            ray.d = normal * side;
-            CrtRay beyond = ray;
-            beyond.o = ray.o + ray.d * touching;
-            beyond.reach = largest;
-            const CrtHit hit = closestWithin(context, beyond, tests);
+        for (const NormalRay& from : *rays) {
+            const CrtHit hit = closestWithin(context, from.ray, tests);
             if (hit.slot == CRT_NONE || hit.slot == slot) continue;
-            const float clearance = std::max(faces[slot].clearance, faces[hit.slot].clearance);
-            if (hit.t + touching > clearance) continue;
+            const std::optional<float> clearance = clearanceBeyond(context, slot, from, hit);
+            if (!clearance) continue;
             ++found.near;
             found.nearest_clearance = std::max(
-                found.nearest_clearance, std::ldexp(static_cast<double>(clearance), -scene.scale_exponent));
+                found.nearest_clearance, std::ldexp(static_cast<double>(*clearance), -scene.scale_exponent));
             break;
         }
     }

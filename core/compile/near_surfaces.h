@@ -3,8 +3,12 @@
 #pragma once
 
 #include "compile/compile.h"
+#include "kernel/dialect/context.h"
 #include "kernel/dialect/layout.h"
+#include "kernel/geometry/hit.h"
+#include "kernel/geometry/ray.h"
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -27,6 +31,18 @@ std::uint64_t askedEmitterStep(std::uint64_t emitters);
 
 /// Of this number of faces; 0 if there are none.
 float largestClearance(const kernel::CrtFace* faces, std::size_t count);
+
+/// A ray by which findNearSurfaces looks for neighbours of a triangle.
+struct NormalRay {
+    kernel::CrtRay ray;
+    float touching;  ///< The ray begins at this distance from the triangle, beyond what touches it.
+};
+/// To both sides, as far as `reach`; nothing for a triangle without area.
+std::optional<std::array<NormalRay, 2>> normalRays(const kernel::CrtContext& context, std::uint32_t slot,
+                                                   float reach);
+/// The clearance that is too large for the distance of the triangle to what its ray hits, if it is.
+std::optional<float> clearanceBeyond(const kernel::CrtContext& context, std::uint32_t slot,
+                                     const NormalRay& from, const kernel::CrtHit& hit);
 
 /// A lamp in the plane of another surface, which it overlaps: rays meet both at one distance but for
 /// rounding, and see now one, now the other.

@@ -1,0 +1,231 @@
+#include "compile/near_pairs.h"
+
+#include "base/parallel.h"
+#include "compile/accelerator.h"
+#include "compile/context_of.h"
+#include "compile/coplanar.h"
+#include "compile/near_surfaces.h"
+#include "kernel/geometry/slots.h"
+#include "kernel/geometry/surface.h"
+
+#include <algorithm>
+#include <atomic>
+#include <bit>
+#include <cmath>
+#include <span>
+#include <vector>
+
+namespace crt {
+namespace {
+
+using kernel::CrtFace;
+using kernel::CrtPrimitive;
+using kernel::CrtTriangle;
+using kernel::u64;  // CRT_ARRAY computes with it
+
+constexpr std::size_t kSlotsOfPart = std::size_t{1} << 13;  // of what a thread looks at, at a time
+
+/// A place where something is looked for that lies too near to the surface of a slot.
+struct Asked {
+    TriangleBounds box;
+    std::uint32_t slot;
+    bool emits;
+};
+
+bool meet(const TriangleBounds& a, const TriangleBounds& b) {
+    bool meets = true;
+    for (std::size_t k = 0; k < 3; ++k)
+        meets = meets && a.lower[k] <= b.upper[k] && b.lower[k] <= a.upper[k];
+    return meets;
+}
+
+/// Places within ±1 by the cells that they meet. The cells of a level are twice as large as those
+/// before. A place is in the first level of whose cells it meets at most 8.
+class Places {
+public:
+    /// The smallest cells are about as large as the triangles of a surface with this number of triangles.
+    Places(std::vector<Asked> asked, std::size_t triangles);
+
+    /// Calls visit(place) for all whose boxes meet `box`, some of them repeatedly. Returns the number of
+    /// boxes that were looked at.
+    template <class Visit>
+    std::uint64_t visitAll(const TriangleBounds& box, const Visit& visit) const {
+        std::uint64_t looks = 0;
+        const auto look = [&](std::uint32_t i) {
+            ++looks;
+            if (meet(box, asked_[i].box)) visit(asked_[i]);
+        };
+        for (std::size_t level = 0; level < levels_.size(); ++level) {
+            const std::vector<std::uint32_t>& places = levels_[level];
+            if (places.empty()) continue;
+            const Range range = rangeOf(box, level);
+            if (range.cells() > places.size()) {
+                for (const std::uint32_t i : places) look(i);
+                continue;
+            }
+            forEachCell(range, level, [&](std::size_t bucket) {
+                ++looks;
+                for (std::uint32_t e = first_[bucket]; e < first_[bucket + 1]; ++e) look(entries_[e]);
+            });
+        }
+        return looks;
+    }
+
+private:
+    struct Range {
+        std::array<std::uint32_t, 3> first, last;
+        std::uint64_t cells() const {
+            std::uint64_t product = 1;
+            for (std::size_t k = 0; k < 3; ++k) product *= last[k] - first[k] + 1;
+            return product;
+        }
+    };
+
+    Range rangeOf(const TriangleBounds& box, std::size_t level) const {
+        const float side = std::ldexp(side_, -static_cast<int>(level));
+        const auto cell = [&](float x) {
+            return static_cast<std::uint32_t>(std::clamp((x + 1) * 0.5f * side, 0.0f, side - 1));
+        };
+        Range range{};
+        for (std::size_t k = 0; k < 3; ++k) {
+            range.first[k] = cell(box.lower[k]);
+            range.last[k] = cell(box.upper[k]);
+        }
+        return range;
+    }
+
+    template <class Visit>
+    void forEachCell(const Range& range, std::size_t level, const Visit& visit) const {
+        for (std::uint32_t z = range.first[2]; z <= range.last[2]; ++z)
+            for (std::uint32_t y = range.first[1]; y <= range.last[1]; ++y)
+                for (std::uint32_t x = range.first[0]; x <= range.last[0]; ++x) {
+                    const std::uint64_t cell =
+                        std::uint64_t{level + 1} << 30 | std::uint64_t{z} << 20 | std::uint64_t{y} << 10 | x;
+                    visit(cell * 0x9e3779b97f4a7c15ull >> (64 - log_buckets_));  // Fibonacci hashing
+                }
+    }
+
+    std::vector<Asked> asked_;
+    float side_;  ///< Cells of the first level along an axis.
+    int log_buckets_;
+    std::vector<std::vector<std::uint32_t>> levels_;
+    std::vector<std::uint32_t> first_, entries_;  ///< Places by the hash of their cells.
+};
+
+Places::Places(std::vector<Asked> asked, std::size_t triangles) : asked_(std::move(asked)) {
+    const auto side = std::clamp<std::size_t>(
+        std::bit_ceil(static_cast<std::size_t>(std::sqrt(static_cast<double>(triangles)))), 64, 1024);
+    side_ = static_cast<float>(side);
+    levels_.resize(static_cast<std::size_t>(std::bit_width(side)));
+    log_buckets_ = std::max(10, static_cast<int>(std::bit_width(8 * asked_.size())));
+    std::vector<std::size_t> level_of(asked_.size());
+    for (std::uint32_t i = 0; i < asked_.size(); ++i) {
+        std::size_t& level = level_of[i];
+        while (rangeOf(asked_[i].box, level).cells() > 8) ++level;
+        levels_[level].push_back(i);
+    }
+    const auto forEachEntry = [&](const auto& visit) {
+        for (std::uint32_t i = 0; i < asked_.size(); ++i)
+            forEachCell(rangeOf(asked_[i].box, level_of[i]), level_of[i],
+                        [&](std::size_t bucket) { visit(bucket, i); });
+    };
+    // Counts, their sums, and then the entries from the last of each bucket to the first.
+    first_.resize((std::size_t{1} << log_buckets_) + 1);
+    forEachEntry([&](std::size_t bucket, std::uint32_t) { ++first_[bucket]; });
+    std::uint32_t sum = 0;
+    for (std::uint32_t& first : first_) first = sum += first;
+    entries_.resize(sum);
+    forEachEntry([&](std::size_t bucket, std::uint32_t i) { entries_[--first_[bucket]] = i; });
+}
+
+/// Looks at pairs of surfaces of a scene.
+class Pairs {
+public:
+    explicit Pairs(const CompiledScene& scene)
+        : scene_(scene),
+          context_(contextOf(scene)),
+          triangles_(CRT_ARRAY(CrtTriangle, context_.blob, context_.scene->triangles)),
+          primitives_(CRT_ARRAY(CrtPrimitive, context_.blob, context_.scene->primitives)),
+          count_(context_.scene->triangle_count),
+          largest_(largestClearance(CRT_ARRAY(CrtFace, context_.blob, context_.scene->faces), count_)) {}
+
+    std::vector<Asked> asked() const;
+    bool any() const;
+
+private:
+    /// As of near_scene.cpp: nothing is reached from farther away.
+    float reach() const { return 2 * largest_ + 64 * CRT_EPSILON; }
+    bool isNear(const Asked& asked, std::uint32_t other) const;
+
+    const CompiledScene& scene_;
+    kernel::CrtContext context_;
+    const CrtTriangle* triangles_;
+    const CrtPrimitive* primitives_;
+    std::uint32_t count_;
+    float largest_;
+};
+
+/// Without nodes a triangle's slot is its id.
+std::vector<Asked> Pairs::asked() const {
+    std::vector<Asked> all;
+    const std::uint64_t step = askedEmitterStep(scene_.emitters);
+    for (std::uint32_t slot = 0; slot < count_ && scene_.emitters > 0; ++slot) {
+        const std::uint32_t emitter = primitives_[triangles_[slot].id].light;
+        if (emitter != CRT_NONE && emitter % step == 0)
+            all.push_back({boundsOf(triangles_[slot], reach()), slot, true});
+    }
+    if (context_.scene->max_depth == 0) return all;
+    for (const std::uint32_t slot : askedTriangles(scene_.triangles)) {
+        TriangleBounds middle{};
+        for (std::size_t k = 0; k < 3; ++k) {
+            const float* p = triangles_[slot].p + 3 * k;
+            middle.lower[k] = (p[0] + p[1] + p[2]) / 3 - reach();
+            middle.upper[k] = (p[0] + p[1] + p[2]) / 3 + reach();
+        }
+        all.push_back({middle, slot, false});
+    }
+    return all;
+}
+
+bool Pairs::isNear(const Asked& asked, std::uint32_t other) const {
+    if (asked.slot == other) return false;
+    if (asked.emits) {
+        if (primitives_[triangles_[other].id].light == primitives_[triangles_[asked.slot].id].light)
+            return false;
+        const Corners own = cornersOf(context_.blob, asked.slot), corners = cornersOf(context_.blob, other);
+        return inOnePlane(own, corners) && overlap(own, corners);
+    }
+    const auto rays = normalRays(context_, asked.slot, largest_);
+    for (std::size_t i = 0; rays && i < rays->size(); ++i) {
+        const NormalRay& from = (*rays)[i];
+        kernel::CrtHit hit = kernel::crt_no_hit(from.ray.reach);
+        kernel::crt_test_slot(&context_, triangles_, other, from.ray, kernel::crt_shear(from.ray), &hit);
+        if (hit.slot != CRT_NONE && clearanceBeyond(context_, asked.slot, from, hit)) return true;
+    }
+    return false;
+}
+
+bool Pairs::any() const {
+    constexpr std::uint64_t kMostLooks = 10'000'000, kMostOfSlot = 64;
+    const Places places(asked(), count_);
+    std::atomic<std::uint64_t> looks{0};
+    std::atomic<bool> found{false};
+    parallelFor(count_, kSlotsOfPart, [&](std::size_t first, std::size_t end) {
+        std::uint64_t own_looks = 0;
+        for (auto slot = static_cast<std::uint32_t>(first); slot < end && !found; ++slot) {
+            if (triangles_[slot].shape >= CRT_SLOT_INSTANCE) continue;
+            own_looks += places.visitAll(boundsOf(triangles_[slot], reach()), [&](const Asked& asked) {
+                if (!found && isNear(asked, slot)) found = true;
+            });
+            if (looks + own_looks > kMostLooks + kMostOfSlot * count_) found = true;  // It would take long.
+        }
+        looks += own_looks;
+    });
+    return found;
+}
+
+}  // namespace
+
+bool mayHaveNearSurfaces(const CompiledScene& scene) { return Pairs(scene).any(); }
+
+}  // namespace crt
