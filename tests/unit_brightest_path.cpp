@@ -93,6 +93,19 @@ TEST_CASE("brightest path: what hides a light hides its paths", "[brightest-path
               .luminance >= 1000);
 }
 
+TEST_CASE("brightest path: a sheet among hundreds of surfaces hides a light", "[brightest-path]") {
+    for (const int before : {30, 63, 64, 200}) {
+        std::string objects;
+        for (int i = 0; i < 260; ++i)
+            objects += i == before ? kSheet
+                                   : fmt::format(
+                                         "  - {{rectangle: {{size: [0.1, 0.1]}}, material: black, "
+                                         "transform: [{{translate: [{}, 3, 1]}}]}}\n",
+                                         i);
+        CHECK(std::isinf(brightestPathOf(kSun, kMirror, objects).luminance));
+    }
+}
+
 TEST_CASE("brightest path: what emits or is black sends on nothing", "[brightest-path]") {
     CHECK(std::isinf(brightestPathOf(kSun, "{type: diffuse, reflectance: 0}").luminance));
     CHECK(std::isinf(brightestPathOf("", kDiffuse).luminance));

@@ -1,12 +1,16 @@
 #include "render/brightest_path.h"
 
+#include "base/parallel.h"
+#include "kernel/geometry/boxes.h"
 #include "kernel/geometry/slots.h"
 #include "kernel/materials/composition.h"
 #include "kernel/transport/direct_light.h"
 
+#include "compile/accelerator.h"
 #include "compile/context_of.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <iterator>
@@ -24,9 +28,10 @@ constexpr std::size_t kSurfacePoints = 2048;  ///< Number of surface points, div
 constexpr std::size_t kMostOfMaterial = 64;  ///< Points of one material at most.
 constexpr std::uint32_t kLightsPerPoint = 4;
 constexpr std::uint32_t kSamplesOfBsdf = 8;
-/// Intersection tests of shadow rays with surfaces. They take about a tenth of a second.
+/// Intersection tests of shadow rays with surfaces. They would take about a tenth of a second.
 constexpr std::uint64_t kTests = 10'000'000;
 constexpr std::uint64_t kLeastRays = 4;
+constexpr std::uint32_t kSlotsOfBox = 64;  ///< Neighbours in a file are mostly neighbours in space.
 
 /// Paths are rare if they are this many times as bright as 99 % of the paths that arrive from random
 /// directions.
@@ -44,6 +49,12 @@ class SurfacePoints {
 public:
     explicit SurfacePoints(const CompiledScene& scene) : context_(contextOf(scene)) {
         triangles_ = CRT_ARRAY(CrtTriangle, context_.blob, context_.scene->triangles);
+        boxes_.resize(partsOf(context_.scene->triangle_count, kSlotsOfBox));
+        parallelFor(
+            context_.scene->triangle_count, kSlotsOfBox * 64, [&](std::size_t first, std::size_t end) {
+                for (std::size_t slot = first; slot < end; slot += kSlotsOfBox)
+                    boxes_[slot / kSlotsOfBox] = boundsOfSlots(slot, std::min(end, slot + kSlotsOfBox));
+            });
     }
 
     /// Points on surfaces that do not emit, ordered by material and then as in the scene file.
@@ -59,6 +70,7 @@ public:
     std::optional<double> brightest(std::vector<LitPath> paths, std::size_t left_out = 0) const;
 
 private:
+    TriangleBounds boundsOfSlots(std::size_t first, std::size_t end) const;
     CrtHit hitOf(std::uint32_t slot, std::uint32_t instance, std::uint32_t number) const;
     CrtVertex vertexOf(const CrtSurface& surface, std::uint32_t slot, vec3 wo, vec4 position) const;
     bool mirrors(const CrtVertex& vertex, CrtSampler& sampler) const;
@@ -66,10 +78,24 @@ private:
     std::optional<LitPath> carry(const CrtVertex& vertex, const CrtDirectSample& offer, vec4 share,
                                  const CrtWavelengths& wavelengths) const;
     bool occludes(const CrtRay& ray) const;
+    bool occludes(const CrtRay& ray, std::uint32_t first, std::uint32_t end) const;
 
     CrtContext context_{};
     const CrtTriangle* triangles_ = nullptr;
+    std::vector<TriangleBounds> boxes_;  ///< Of kSlotsOfBox slots each.
 };
+
+TriangleBounds SurfacePoints::boundsOfSlots(std::size_t first, std::size_t end) const {
+    TriangleBounds all = boundsOf(triangles_[first], CRT_BOX_PADDING);
+    for (std::size_t slot = first + 1; slot < end; ++slot) {
+        const TriangleBounds own = boundsOf(triangles_[slot], CRT_BOX_PADDING);
+        for (std::size_t k = 0; k < 3; ++k) {
+            all.lower[k] = std::min(all.lower[k], own.lower[k]);
+            all.upper[k] = std::max(all.upper[k], own.upper[k]);
+        }
+    }
+    return all;
+}
 
 /// A point on the triangle or shape of the slot, chosen by the random numbers of `number`.
 CrtHit SurfacePoints::hitOf(std::uint32_t slot, std::uint32_t instance, std::uint32_t number) const {
@@ -225,8 +251,19 @@ std::pair<std::optional<LitPath>, std::optional<LitPath>> SurfacePoints::light(c
 
 bool SurfacePoints::occludes(const CrtRay& ray) const {
     if (!(ray.reach > 0)) return false;
+    const CrtSlab slab = crt_slab(ray);
+    const auto count = context_.scene->triangle_count;
+    for (std::uint32_t box = 0; box < boxes_.size(); ++box)
+        if (crt_box(boxes_[box].lower.data(), boxes_[box].upper.data(), ray, slab, ray.reach) <
+                CRT_INFINITY &&
+            occludes(ray, box * kSlotsOfBox, std::min(count, (box + 1) * kSlotsOfBox)))
+            return true;
+    return false;
+}
+
+bool SurfacePoints::occludes(const CrtRay& ray, std::uint32_t first, std::uint32_t end) const {
     const CrtShear shear = crt_shear(ray);
-    for (std::uint32_t slot = 0; slot < context_.scene->triangle_count; ++slot) {
+    for (std::uint32_t slot = first; slot < end; ++slot) {
         if (triangles_[slot].shape >= CRT_SLOT_INSTANCE) continue;
         CrtHit hit = crt_no_hit(ray.reach);
         crt_test_slot(&context_, triangles_, slot, ray, shear, &hit);
@@ -255,12 +292,17 @@ BrightestPath brightestPathOf(const CompiledScene& scene) {
     const CrtScene& header = scene.header();
     if (header.integrator != CRT_INTEGRATOR_PATH || header.lights.count == 0) return {};
     const SurfacePoints points(scene);
-    std::vector<LitPath> mirrored, from_anywhere;
     const std::vector<CrtHit> hits = points.choose();
-    for (std::size_t i = 0; i < hits.size(); ++i)
-        for (std::uint32_t k = 0; k < kLightsPerPoint; ++k) {
-            const auto [of_mirror, of_anywhere] =
-                points.light(hits[i], static_cast<std::uint32_t>(i) * kLightsPerPoint + k);
+    using OfPoint = std::array<std::pair<std::optional<LitPath>, std::optional<LitPath>>, kLightsPerPoint>;
+    std::vector<OfPoint> lit(hits.size());
+    parallelFor(hits.size(), 16, [&](std::size_t first, std::size_t end) {
+        for (std::size_t i = first; i < end; ++i)
+            for (std::uint32_t k = 0; k < kLightsPerPoint; ++k)
+                lit[i][k] = points.light(hits[i], static_cast<std::uint32_t>(i) * kLightsPerPoint + k);
+    });
+    std::vector<LitPath> mirrored, from_anywhere;
+    for (const OfPoint& of_point : lit)
+        for (const auto& [of_mirror, of_anywhere] : of_point) {
             if (of_mirror) mirrored.push_back(*of_mirror);
             if (of_anywhere) from_anywhere.push_back(*of_anywhere);
         }
