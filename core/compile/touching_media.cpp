@@ -40,6 +40,41 @@ std::vector<Bounding> boundingTriangles(const unsigned char* blob) {
     return all;
 }
 
+/// For each object: the boxes of the others that meet its own.
+std::vector<std::vector<Box>> boxesAround(const std::vector<Bounding>& all) {
+    struct Object {
+        std::uint32_t number;
+        Box box;
+    };
+    std::uint32_t last = 0;
+    for (const Bounding& b : all) last = std::max(last, b.object);
+    std::vector<Box> boxes(last + std::size_t{1});
+    for (const Bounding& b : all) boxes[b.object].add(b.box);
+    std::vector<Object> objects;
+    for (std::uint32_t i = 0; i < boxes.size(); ++i)
+        if (boxes[i].lower[0] <= boxes[i].upper[0]) objects.push_back({i, boxes[i]});
+    std::sort(objects.begin(), objects.end(),
+              [](const Object& a, const Object& b) { return a.box.lower[0] < b.box.lower[0]; });
+    std::vector<std::vector<Box>> around(boxes.size());
+    for (auto a = objects.begin(); a != objects.end(); ++a)
+        for (auto b = a + 1; b != objects.end() && b->box.lower[0] <= a->box.upper[0]; ++b)
+            if (a->box.meets(b->box)) {
+                around[a->number].push_back(b->box);
+                around[b->number].push_back(a->box);
+            }
+    return around;
+}
+
+/// Leaves those out that are far from all other objects.
+void keepNearOthers(std::vector<Bounding>& all) {
+    const std::vector<std::vector<Box>> around = boxesAround(all);
+    std::erase_if(all, [&](const Bounding& b) {
+        const std::vector<Box>& others = around[b.object];
+        return std::none_of(others.begin(), others.end(),
+                            [&](const Box& other) { return b.box.meets(other); });
+    });
+}
+
 }  // namespace
 
 void markTouchingMedia(unsigned char* blob) {
@@ -49,6 +84,7 @@ void markTouchingMedia(unsigned char* blob) {
     if (std::all_of(all.begin(), all.end(),
                     [&](const Bounding& b) { return b.object == all.front().object; }))
         return;
+    keepNearOthers(all);
     // Sweep and prune along one axis (Baraff 1992).
     std::sort(all.begin(), all.end(), [](const Bounding& a, const Bounding& b) {
         return a.box.lower[0] != b.box.lower[0] ? a.box.lower[0] < b.box.lower[0] : a.id < b.id;
