@@ -2,13 +2,13 @@
 // than a scene may ask for.
 #include "base/memo.h"
 #include "base/program_identity.h"
+#include "base/table_store.h"
 #include "base/temporary_folder.h"
 #include "catch.h"
 #include "compile/coat.h"
 #include "compile/compensation.h"
 #include "compile/compile.h"
 #include "compile/materials.h"
-#include "compile/table_store.h"
 #include "file_bytes.h"
 #include "scene/yaml/scene_yaml.h"
 #include "scoped_variable.h"
@@ -16,11 +16,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cstdlib>
 #include <ctime>
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <span>
 
 using namespace crt;
 
@@ -243,6 +245,29 @@ TEST_CASE("tables of materials on disk are read by the next run", "[compile][mat
     const ScopedVariable no_folder("CRT_CACHE_DIR", "/dev/null");
     CHECK(TableStore().path("albedos of coats", {1.6, 0.2}).empty());
     CHECK(numbersOfNewTables() == made);
+}
+
+TEST_CASE("of several tables those are made that are not on disk", "[cache]") {
+    const TableFolder cache;
+    const auto made = [](const std::vector<double>& inputs) {
+        std::vector<std::array<double, 2>> values(inputs.size());
+        std::vector<WantedTable> wanted;
+        for (std::size_t i = 0; i < inputs.size(); ++i)
+            wanted.push_back({{inputs[i]}, std::as_writable_bytes(std::span(values[i]))});
+        std::vector<double> made_of;
+        TableStore().loadOrMake("pairs", wanted, [&](const std::vector<std::size_t>& missing) {
+            for (const std::size_t i : missing) {
+                values[i] = {inputs[i], -inputs[i]};
+                made_of.push_back(inputs[i]);
+            }
+        });
+        for (std::size_t i = 0; i < inputs.size(); ++i)
+            CHECK(values[i] == std::array{inputs[i], -inputs[i]});
+        return made_of;
+    };
+    CHECK(made({1, 2}) == std::vector<double>{1, 2});
+    CHECK(made({2, 3, 1}) == std::vector<double>{3});
+    CHECK(made({3, 2}).empty());
 }
 
 TEST_CASE("tables of materials on disk that are damaged or of others are made again",

@@ -2,12 +2,17 @@
 // against the colours that it is asked for.
 #include "kernel_test.h"
 
+#include "base/table_store.h"
+#include "base/temporary_folder.h"
+#include "scoped_variable.h"
 #include "spectra/sigmoid.h"
 
 #include <algorithm>
 #include <cfloat>
 #include <cmath>
+#include <filesystem>
 #include <limits>
+#include <vector>
 
 using namespace kernel_test;
 
@@ -132,4 +137,25 @@ TEST_CASE("greys are flat, and ends stay within (0, 1)", "[spectra][sigmoid]") {
     }
     CHECK(colorOf(crt::sigmoidCoefficients({0, 0, 0}))[1] < 2e-7);
     CHECK(colorOf(crt::sigmoidCoefficients({1, 1, 1}))[1] > 1 - 4e-7);
+}
+
+TEST_CASE("the table of coefficients on disk is read by the next run", "[spectra][sigmoid][cache]") {
+    const crt::TemporaryFolder folder;
+    const crt::ScopedVariable variable("CRT_CACHE_DIR", folder.path());
+    const auto reds = [] {
+        const crt::SigmoidTable table;
+        std::vector<crt::SigmoidCoefficients> all;
+        for (const float x : {1e-3f, 0.2f, 0.7f, 0.999f})
+            all.push_back(table.coefficients({x, x / 2, x / 3}, 0, crt::SigmoidTable::level(x)));
+        return all;
+    };
+    const auto made = reds();
+    REQUIRE(std::filesystem::exists(crt::TableStore().path("sigmoids", {})));
+    CHECK(reds() == made);
+    // A table that would not be made is there: so it was read.
+    std::vector<float> planted(3 * 24 * 48 * 48 * 4, 0.25f);
+    crt::TableStore().store("sigmoids", {}, planted.data(), planted.size() * sizeof(float));
+    CHECK(reds() != made);
+    const crt::ScopedVariable no_folder("CRT_CACHE_DIR", "/dev/null");
+    CHECK(reds() == made);
 }

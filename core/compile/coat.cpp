@@ -3,14 +3,15 @@
 #include "base/for_avx2.h"
 #include "base/memo.h"
 #include "base/parallel.h"
+#include "base/table_store.h"
 #include "compile/reflectance.h"
-#include "compile/table_store.h"
 #include "compile/visible_normals.h"
 #include "kernel/materials/bsdf.h"
 
 #include <algorithm>
 #include <cmath>
 #include <set>
+#include <span>
 
 namespace crt {
 namespace {
@@ -72,22 +73,19 @@ void forCoats(const std::vector<const Material*>& materials, const Add& add) {
 
 /// The albedos of coats that are not smooth.
 std::vector<SpectrumValues::Array> makeAlbedos(const std::vector<CoatKey>& keys) {
-    constexpr const char* kKind = "albedos of coats";
     std::vector<SpectrumValues::Array> albedos(keys.size());
-    std::vector<std::size_t> missing;
-    TableStore store;
+    std::vector<WantedTable> wanted;
     for (std::size_t k = 0; k < keys.size(); ++k)
-        if (!store.load(kKind, {keys[k].first, keys[k].second}, &albedos[k], sizeof albedos[k]))
-            missing.push_back(k);
-    parallelFor(missing.size() * kSpectrumSize, 16, [&](std::size_t first, std::size_t end) {
-        for (std::size_t n = first; n < end; ++n) {
-            const std::size_t k = missing[n / kSpectrumSize], i = n % kSpectrumSize;
-            albedos[k][i] = coatAlbedo(std::max(static_cast<double>(i) / kCoatCells, 1e-4), keys[k].first,
-                                       alphaOf(keys[k]));
-        }
+        wanted.push_back({{keys[k].first, keys[k].second}, std::as_writable_bytes(std::span(albedos[k]))});
+    TableStore().loadOrMake("albedos of coats", wanted, [&](const std::vector<std::size_t>& missing) {
+        parallelFor(missing.size() * kSpectrumSize, 16, [&](std::size_t first, std::size_t end) {
+            for (std::size_t n = first; n < end; ++n) {
+                const std::size_t k = missing[n / kSpectrumSize], i = n % kSpectrumSize;
+                const double cosine = std::max(static_cast<double>(i) / kCoatCells, 1e-4);
+                albedos[k][i] = coatAlbedo(cosine, keys[k].first, alphaOf(keys[k]));
+            }
+        });
     });
-    for (const std::size_t k : missing)
-        store.store(kKind, {keys[k].first, keys[k].second}, &albedos[k], sizeof albedos[k]);
     return albedos;
 }
 

@@ -3,8 +3,8 @@
 #include "base/for_avx2.h"
 #include "base/memo.h"
 #include "base/parallel.h"
+#include "base/table_store.h"
 #include "compile/reflectance.h"
-#include "compile/table_store.h"
 #include "compile/visible_normals.h"
 #include "kernel/materials/bsdf.h"
 
@@ -14,6 +14,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <span>
 
 namespace crt {
 namespace {
@@ -260,23 +261,17 @@ void fill(const std::vector<Draft>& plans, const std::vector<std::size_t>& missi
     });
 }
 
-std::vector<LossTable> makeLossTables(const std::vector<LossPlan>& wanted) {
-    constexpr const char* kKind = "losses of microfacets";
-    const std::vector<Draft> plans(wanted.begin(), wanted.end());
+std::vector<LossTable> makeLossTables(const std::vector<LossPlan>& plans) {
+    const std::vector<Draft> drafts(plans.begin(), plans.end());
     std::vector<LossTable> tables(plans.size());
-    std::vector<std::size_t> missing;
-    TableStore store;
+    std::vector<WantedTable> wanted;
     for (std::size_t t = 0; t < plans.size(); ++t) {
-        std::vector<float>& rows = tables[t].rows;
-        tables[t].record = plans[t].record;
-        rows.resize(plans[t].rows.size() * kStride);
-        if (!store.load(kKind, inputsOf(wanted[t]), rows.data(), rows.size() * sizeof(float)))
-            missing.push_back(t);
+        tables[t].record = drafts[t].record;
+        tables[t].rows.resize(drafts[t].rows.size() * kStride);
+        wanted.push_back({inputsOf(plans[t]), std::as_writable_bytes(std::span(tables[t].rows))});
     }
-    fill(plans, missing, tables);
-    for (const std::size_t t : missing)
-        store.store(kKind, inputsOf(wanted[t]), tables[t].rows.data(),
-                    tables[t].rows.size() * sizeof(float));
+    TableStore().loadOrMake("losses of microfacets", wanted,
+                            [&](const std::vector<std::size_t>& missing) { fill(drafts, missing, tables); });
     return tables;
 }
 

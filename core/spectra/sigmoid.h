@@ -18,14 +18,16 @@ using SigmoidCoefficients = std::array<float, 3>;
 /// Coefficients of a linear sRGB colour in [0, 1]. The colour that the reflectance shows under D65 is within
 /// 10⁻⁴ of it in each component on average, and 3·10⁻³ at worst, next to white
 /// (tests/unit_sigmoid.cpp); greys are exact. Black and white are 10⁻⁷ off 0 and 1. Values outside [0,
-/// 1] count as the nearer end; NaN as 0. The first call makes a table of 2.7 MB, by threads, in a fraction
-/// of a second. [any thread]
+/// 1] count as the nearer end; NaN as 0. The first call reads a table of 2.7 MB (base/table_store.h) or
+/// makes it, by threads, in a fraction of a second. [any thread]
 SigmoidCoefficients sigmoidCoefficients(const std::array<float, 3>& linear_srgb);
 
 /// The table behind sigmoidCoefficients(), for callers with millions of colours.
 class SigmoidTable {
 public:
-    /// Made by the first call.
+    /// Reads the values, or makes them.
+    SigmoidTable();
+    /// One for the process; the first call constructs it.
     static const SigmoidTable& get();
 
     /// The part that depends only on the largest component of a colour; images have few of them.
@@ -38,7 +40,7 @@ public:
                                      const Level& level) const;
 
 private:
-    SigmoidTable();
+    void make();
     struct Node {
         float c[4];
     };

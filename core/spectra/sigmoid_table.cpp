@@ -1,9 +1,11 @@
 #include "base/parallel.h"
+#include "base/table_store.h"
 #include "spectra/sigmoid.h"
 
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <span>
 
 namespace crt {
 namespace {
@@ -72,7 +74,13 @@ std::size_t SigmoidTable::index(std::size_t channel, std::size_t level, std::siz
     return ((channel * kLevels + level) * kRatios + a) * kRatios + b;
 }
 
+/// It depends on nothing but the build.
 SigmoidTable::SigmoidTable() : nodes_(3 * kLevels * kRatios * kRatios) {
+    TableStore().loadOrMake("sigmoids", {{{}, std::as_writable_bytes(std::span(nodes_))}},
+                            [this](const std::vector<std::size_t>&) { make(); });
+}
+
+void SigmoidTable::make() {
     const std::vector<SigmoidNode> weights = coarseNodes();
     // Each fit starts from that of a neighbour: from equal components down to saturated ones, and there from
     // the middle to dark and bright.

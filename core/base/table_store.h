@@ -1,15 +1,23 @@
-/// Tables of materials on disk, in the folder of base/cache_folder.h: the next run that needs one reads it.
-/// They depend on a few numbers of a material and on nothing else of the scene, and take up to a second.
+/// Tables on disk, in the folder of base/cache_folder.h: the next run that needs one reads it. They depend
+/// on a few numbers, of a material for example, and on nothing else of the scene, and take up to a second.
 #pragma once
 
 #include "base/file_cache.h"
 
 #include <cstddef>
+#include <functional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
 namespace crt {
+
+/// The inputs of a table, and the memory of its values.
+struct WantedTable {
+    std::vector<double> inputs;
+    std::span<std::byte> values;
+};
 
 /// Looks the folder up once: for the tables of one scene. Where there is no folder, or this build cannot be
 /// told from others, it holds nothing.
@@ -27,6 +35,11 @@ public:
               std::size_t bytes) const;
     void store(std::string_view kind, const std::vector<double>& inputs, const void* values,
                std::size_t bytes);
+
+    /// Reads the tables of a kind that are there, has the others made, and stores those. `make` gets their
+    /// numbers in `wanted`, and fills their values in; it is not called where all are there.
+    void loadOrMake(std::string_view kind, const std::vector<WantedTable>& wanted,
+                    const std::function<void(const std::vector<std::size_t>& missing)>& make);
 
     /// The file of a table; empty where the store holds nothing.
     std::string path(std::string_view kind, const std::vector<double>& inputs) const;

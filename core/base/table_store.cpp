@@ -1,4 +1,4 @@
-#include "compile/table_store.h"
+#include "base/table_store.h"
 
 #include "base/cache_folder.h"
 #include "base/program_identity.h"
@@ -9,7 +9,7 @@
 namespace crt {
 namespace {
 
-/// More than a thousand tables: the largest has 1 MB, most have less than 50 kB.
+/// More than a thousand tables: the largest have 3 MB, most have less than 50 kB.
 constexpr std::uint64_t kMaxBytes = std::uint64_t{64} << 20;
 
 }  // namespace
@@ -42,6 +42,19 @@ bool TableStore::load(std::string_view kind, const std::vector<double>& inputs, 
 void TableStore::store(std::string_view kind, const std::vector<double>& inputs, const void* values,
                        std::size_t bytes) {
     has_stored_ = files_.store(keyOf(kind, inputs), values, bytes) || has_stored_;
+}
+
+void TableStore::loadOrMake(std::string_view kind, const std::vector<WantedTable>& wanted,
+                            const std::function<void(const std::vector<std::size_t>& missing)>& make) {
+    std::vector<std::size_t> missing;
+    for (std::size_t i = 0; i < wanted.size(); ++i) {
+        const auto& [inputs, values] = wanted[i];
+        if (!load(kind, inputs, values.data(), values.size())) missing.push_back(i);
+    }
+    if (missing.empty()) return;
+    make(missing);
+    for (const std::size_t i : missing)
+        store(kind, wanted[i].inputs, wanted[i].values.data(), wanted[i].values.size());
 }
 
 }  // namespace crt
