@@ -13,6 +13,7 @@
 #include <cstdint>
 #include <limits>
 #include <numbers>
+#include <optional>
 
 namespace crt {
 namespace {
@@ -67,15 +68,8 @@ double radiusAround(const Quadric& shape, const Matrix4d& transform) {
 class Front {
 public:
     explicit Front(const Scene& scene) : scene_(scene) {
-        for (const Object& object : scene.objects) {
-            const Mesh& mesh = scene.meshes[object.mesh];
-            for (const Matrix4d& transform : object.transforms) {
-                if (points_ += mesh.positions.size(); points_ > kMostPoints) return;
-                for (const Vec3d& p : mesh.positions)
-                    for (const double x : transformPoint(transform, p))
-                        largest_ = std::max(largest_, std::abs(x));
-            }
-        }
+        for (const Object& object : scene.objects)
+            points_ += std::uint64_t{scene.meshes[object.mesh].positions.size()} * object.transforms.size();
     }
 
     bool tooManyPoints() const { return points_ > kMostPoints; }
@@ -83,7 +77,8 @@ public:
 
     bool isEmpty(const Face& face) {
         constexpr double kRounding = 1e-12;  // Of double, many times over.
-        const double least = kRounding * std::max(largest_, length(face.point));
+        if (!largest_) largest_ = largestCoordinate();
+        const double least = kRounding * std::max(*largest_, length(face.point));
         const auto inFront = [&](const Vec3d& p, double reach) {
             return dot(p - face.point, face.normal) + reach > least;
         };
@@ -102,10 +97,20 @@ public:
     }
 
 private:
+    double largestCoordinate() const {
+        double largest = 0;
+        for (const Object& object : scene_.objects)
+            for (const Matrix4d& transform : object.transforms)
+                for (const Vec3d& p : scene_.meshes[object.mesh].positions)
+                    for (const double x : transformPoint(transform, p))
+                        largest = std::max(largest, std::abs(x));
+        return largest;
+    }
+
     static constexpr std::uint64_t kMostPoints = 20'000'000, kMostLooks = 100'000'000;
     const Scene& scene_;
     std::uint64_t points_ = 0, looks_ = 0;
-    double largest_ = 0;
+    std::optional<double> largest_;  ///< Nothing before the first face.
 };
 
 std::string nameOf(const Object& object) {
