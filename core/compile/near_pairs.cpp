@@ -29,7 +29,7 @@ constexpr std::size_t kSlotsOfPart = std::size_t{1} << 13;  // of what a thread 
 struct Asked {
     TriangleBounds box;
     std::uint32_t slot;
-    bool emits;
+    std::uint32_t first_ray;  ///< Of two; CRT_NONE: the surface is a light, and others of its plane count.
 };
 
 bool meet(const TriangleBounds& a, const TriangleBounds& b) {
@@ -43,8 +43,9 @@ bool meet(const TriangleBounds& a, const TriangleBounds& b) {
 /// before. A place is in the first level of whose cells it meets at most 8.
 class Places {
 public:
-    /// The smallest cells are about as large as the triangles of a surface with this number of triangles.
-    Places(std::vector<Asked> asked, std::size_t triangles);
+    /// `typical`: some of the boxes that will be visited. The smallest cells are as small as they can be
+    /// while such a box meets few of them.
+    Places(std::vector<Asked> asked, const std::vector<TriangleBounds>& typical);
 
     /// Calls visit(place) for all whose boxes meet `box`, some of them repeatedly. Returns the number of
     /// boxes that were looked at.
@@ -112,11 +113,18 @@ private:
     std::vector<std::uint32_t> first_, entries_;  ///< Places by the hash of their cells.
 };
 
-Places::Places(std::vector<Asked> asked, std::size_t triangles) : asked_(std::move(asked)) {
-    const auto side = std::clamp<std::size_t>(
-        std::bit_ceil(static_cast<std::size_t>(std::sqrt(static_cast<double>(triangles)))), 64, 1024);
-    side_ = static_cast<float>(side);
-    levels_.resize(static_cast<std::size_t>(std::bit_width(side)));
+Places::Places(std::vector<Asked> asked, const std::vector<TriangleBounds>& typical)
+    : asked_(std::move(asked)) {
+    constexpr std::uint64_t kFewCells = 32;
+    constexpr float kLeastSide = 64, kMostSide = 65536;
+    const auto meetFew = [&] {
+        std::uint64_t cells = 0;
+        for (const TriangleBounds& box : typical)
+            cells += std::min<std::uint64_t>(rangeOf(box, 0).cells(), 64 * kFewCells);
+        return cells <= kFewCells * typical.size();
+    };
+    for (side_ = kMostSide; side_ > kLeastSide && !meetFew();) side_ /= 2;
+    levels_.resize(std::size_t{1} + static_cast<std::size_t>(std::ilogb(side_)));
     log_buckets_ = std::max(10, static_cast<int>(std::bit_width(8 * asked_.size())));
     std::vector<std::size_t> level_of(asked_.size());
     for (std::uint32_t i = 0; i < asked_.size(); ++i) {
@@ -138,24 +146,32 @@ Places::Places(std::vector<Asked> asked, std::size_t triangles) : asked_(std::mo
     forEachEntry([&](std::size_t bucket, std::uint32_t i) { entries_[--first_[bucket]] = i; });
 }
 
+/// A ray of a place that is asked about, and what it hits.
+struct Hit {
+    std::uint32_t ray;
+    kernel::CrtHit hit;
+};
+
 /// Looks at pairs of surfaces of a scene.
 class Pairs {
 public:
-    explicit Pairs(const CompiledScene& scene)
-        : scene_(scene),
-          context_(contextOf(scene)),
-          triangles_(CRT_ARRAY(CrtTriangle, context_.blob, context_.scene->triangles)),
-          primitives_(CRT_ARRAY(CrtPrimitive, context_.blob, context_.scene->primitives)),
-          count_(context_.scene->triangle_count),
-          largest_(largestClearance(CRT_ARRAY(CrtFace, context_.blob, context_.scene->faces), count_)) {}
+    explicit Pairs(const CompiledScene& scene);
 
-    std::vector<Asked> asked() const;
     bool any() const;
 
 private:
+    struct Ray {
+        NormalRay from;
+        kernel::CrtShear shear;
+    };
+
     /// As of near_scene.cpp: nothing is reached from farther away.
     float reach() const { return 2 * largest_ + 64 * CRT_EPSILON; }
-    bool isNear(const Asked& asked, std::uint32_t other) const;
+    std::vector<Asked> askedPlaces();
+    std::vector<TriangleBounds> typicalBoxes() const;
+    bool isCoplanar(const Asked& light, std::uint32_t other) const;
+    void hitBy(const Asked& asked, std::uint32_t slot, std::vector<Hit>& hits) const;
+    bool anyNear(const std::vector<std::vector<Hit>>& parts) const;
 
     const CompiledScene& scene_;
     kernel::CrtContext context_;
@@ -163,65 +179,108 @@ private:
     const CrtPrimitive* primitives_;
     std::uint32_t count_;
     float largest_;
+    std::vector<Ray> rays_;             ///< Two for each triangle that is asked about and has area.
+    std::vector<std::uint32_t> slots_;  ///< Its slot, for each of them.
+    Places places_;
 };
 
+Pairs::Pairs(const CompiledScene& scene)
+    : scene_(scene),
+      context_(contextOf(scene)),
+      triangles_(CRT_ARRAY(CrtTriangle, context_.blob, context_.scene->triangles)),
+      primitives_(CRT_ARRAY(CrtPrimitive, context_.blob, context_.scene->primitives)),
+      count_(context_.scene->triangle_count),
+      largest_(largestClearance(CRT_ARRAY(CrtFace, context_.blob, context_.scene->faces), count_)),
+      places_(askedPlaces(), typicalBoxes()) {}
+
 /// Without nodes a triangle's slot is its id.
-std::vector<Asked> Pairs::asked() const {
+std::vector<Asked> Pairs::askedPlaces() {
     std::vector<Asked> all;
     const std::uint64_t step = askedEmitterStep(scene_.emitters);
     for (std::uint32_t slot = 0; slot < count_ && scene_.emitters > 0; ++slot) {
         const std::uint32_t emitter = primitives_[triangles_[slot].id].light;
         if (emitter != CRT_NONE && emitter % step == 0)
-            all.push_back({boundsOf(triangles_[slot], reach()), slot, true});
+            all.push_back({boundsOf(triangles_[slot], reach()), slot, CRT_NONE});
     }
     if (context_.scene->max_depth == 0) return all;
     for (const std::uint32_t slot : askedTriangles(scene_.triangles)) {
+        const auto rays = normalRays(context_, slot, largest_);
+        if (!rays) continue;
         TriangleBounds middle{};
         for (std::size_t k = 0; k < 3; ++k) {
             const float* p = triangles_[slot].p + 3 * k;
             middle.lower[k] = (p[0] + p[1] + p[2]) / 3 - reach();
             middle.upper[k] = (p[0] + p[1] + p[2]) / 3 + reach();
         }
-        all.push_back({middle, slot, false});
+        all.push_back({middle, slot, static_cast<std::uint32_t>(rays_.size())});
+        for (const NormalRay& from : *rays) {
+            rays_.push_back({from, kernel::crt_shear(from.ray)});
+            slots_.push_back(slot);
+        }
     }
     return all;
 }
 
-bool Pairs::isNear(const Asked& asked, std::uint32_t other) const {
-    if (asked.slot == other) return false;
-    if (asked.emits) {
-        if (primitives_[triangles_[other].id].light == primitives_[triangles_[asked.slot].id].light)
-            return false;
-        const Corners own = cornersOf(context_.blob, asked.slot), corners = cornersOf(context_.blob, other);
-        return inOnePlane(own, corners) && overlap(own, corners);
-    }
-    const auto rays = normalRays(context_, asked.slot, largest_);
-    for (std::size_t i = 0; rays && i < rays->size(); ++i) {
-        const NormalRay& from = (*rays)[i];
+std::vector<TriangleBounds> Pairs::typicalBoxes() const {
+    constexpr std::size_t kBoxes = 1000;
+    std::vector<std::uint32_t> slots = askedTriangles(scene_.triangles);
+    slots.resize(std::min(slots.size(), kBoxes));
+    std::vector<TriangleBounds> boxes;
+    for (const std::uint32_t slot : slots) boxes.push_back(boundsOf(triangles_[slot], reach()));
+    return boxes;
+}
+
+bool Pairs::isCoplanar(const Asked& light, std::uint32_t other) const {
+    if (light.slot == other ||
+        primitives_[triangles_[other].id].light == primitives_[triangles_[light.slot].id].light)
+        return false;
+    const Corners own = cornersOf(context_.blob, light.slot), corners = cornersOf(context_.blob, other);
+    return inOnePlane(own, corners) && overlap(own, corners);
+}
+
+/// Of a triangle itself, too: what lies behind it counts no more than with findNearSurfaces.
+void Pairs::hitBy(const Asked& asked, std::uint32_t slot, std::vector<Hit>& hits) const {
+    for (std::uint32_t i = asked.first_ray; i < asked.first_ray + 2; ++i) {
+        const auto& [from, shear] = rays_[i];
         kernel::CrtHit hit = kernel::crt_no_hit(from.ray.reach);
-        kernel::crt_test_slot(&context_, triangles_, other, from.ray, kernel::crt_shear(from.ray), &hit);
-        if (hit.slot != CRT_NONE && clearanceBeyond(context_, asked.slot, from, hit)) return true;
+        kernel::crt_test_slot(&context_, triangles_, slot, from.ray, shear, &hit);
+        if (hit.slot != CRT_NONE) hits.push_back({i, hit});
     }
+}
+
+/// Of several hits of a ray the nearest counts, and of equally near ones the lower id.
+bool Pairs::anyNear(const std::vector<std::vector<Hit>>& parts) const {
+    std::vector<kernel::CrtHit> best(rays_.size(), kernel::crt_no_hit(CRT_INFINITY));
+    for (const std::vector<Hit>& part : parts)
+        for (const auto& [ray, hit] : part)
+            if (hit.t < best[ray].t || (hit.t == best[ray].t && hit.id < best[ray].id)) best[ray] = hit;
+    for (std::size_t i = 0; i < best.size(); ++i)
+        if (best[i].slot != CRT_NONE && best[i].slot != slots_[i] &&
+            clearanceBeyond(context_, slots_[i], rays_[i].from, best[i]))
+            return true;
     return false;
 }
 
 bool Pairs::any() const {
     constexpr std::uint64_t kMostLooks = 10'000'000, kMostOfSlot = 64;
-    const Places places(asked(), count_);
     std::atomic<std::uint64_t> looks{0};
     std::atomic<bool> found{false};
+    std::vector<std::vector<Hit>> hits(partsOf(count_, kSlotsOfPart));
     parallelFor(count_, kSlotsOfPart, [&](std::size_t first, std::size_t end) {
         std::uint64_t own_looks = 0;
         for (auto slot = static_cast<std::uint32_t>(first); slot < end && !found; ++slot) {
             if (triangles_[slot].shape >= CRT_SLOT_INSTANCE) continue;
-            own_looks += places.visitAll(boundsOf(triangles_[slot], reach()), [&](const Asked& asked) {
-                if (!found && isNear(asked, slot)) found = true;
+            own_looks += places_.visitAll(boundsOf(triangles_[slot], reach()), [&](const Asked& asked) {
+                if (asked.first_ray != CRT_NONE)
+                    hitBy(asked, slot, hits[first / kSlotsOfPart]);
+                else if (!found && isCoplanar(asked, slot))
+                    found = true;
             });
             if (looks + own_looks > kMostLooks + kMostOfSlot * count_) found = true;  // It would take long.
         }
         looks += own_looks;
     });
-    return found;
+    return found || anyNear(hits);
 }
 
 }  // namespace
