@@ -2,8 +2,7 @@
 #pragma once
 
 #include "base/error.h"
-#include "base/huge_pages.h"
-#include "base/parallel.h"
+#include "base/large_memory.h"
 #include "compile/compile.h"
 #include "kernel/dialect/layout.h"
 
@@ -23,17 +22,10 @@ public:
     BlobWriter() { grow(sizeof(kernel::CrtScene)); }
 
     /// Reserves room for this number of bytes in all, so that hundreds of megabytes are not moved while they
-    /// grow. Large ones are touched by all threads: the system's giving them takes longer than filling them.
+    /// grow.
     void reserve(std::size_t bytes) {
         lines_.reserve(linesFor(bytes));
-        constexpr std::size_t kPage = 4096, kPart = std::size_t{4} << 20;
-        auto* const first = reinterpret_cast<unsigned char*>(lines_.data() + lines_.size());
-        const std::size_t room = (lines_.capacity() - lines_.size()) * sizeof(Line);
-        if (room < 16 * kPart) return;
-        adviseHugePages(first, room);
-        parallelFor(room, kPart, [first](std::size_t begin, std::size_t end) {
-            for (std::size_t at = begin; at < end; at += kPage) first[at] = 0;
-        });
+        touchLargeMemory(lines_.data() + lines_.size(), (lines_.capacity() - lines_.size()) * sizeof(Line));
     }
 
     template <class T>

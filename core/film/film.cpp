@@ -1,6 +1,7 @@
 #include "film/film.h"
 
 #include "base/host.h"
+#include "base/large_memory.h"
 #include "base/parallel.h"
 #include "film/error_estimate.h"
 #include "film/luminance_error.h"
@@ -145,7 +146,10 @@ Film::Film(FilmShape shape) : shape_(shape) {
                                 "{:.1f} GB are free; reduce it, or render parts of it with --crop",
                                 shape.width, shape.height, shape.channels, static_cast<double>(bytes) / 1e9,
                                 static_cast<double>(availableHostMemory()) / 1e9));
-    sums.assign(pixels * shape.channels * 2, 0.0);
+    const std::size_t numbers = pixels * shape.channels * 2;
+    sums.reserve(numbers);
+    touchLargeMemory(sums.data(), numbers * sizeof(double));
+    sums.assign(numbers, 0.0);
     counts.assign(pixels, 0);
     if (shape.aovs & kAovPrimitive) primitives.assign(pixels, CRT_NONE);
     splats.assign(pixels * shape.splatWords(), 0);

@@ -7,6 +7,7 @@
 #include "backend/crt_backend.h"
 #include "backend/sdk/plugin_guard.h"
 
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <memory>
@@ -34,6 +35,7 @@ private:
     struct alignas(64) Line {
         unsigned char bytes[64];
     };
+    void copyBlob(const unsigned char* bytes, std::size_t size);
     bool differsInViewAlone(const CrtSceneBlob& given) const;
     const kernel::CrtScene& scene() const { return *reinterpret_cast<const kernel::CrtScene*>(blob_.get()); }
     const unsigned char* blob() const { return reinterpret_cast<const unsigned char*>(blob_.get()); }
