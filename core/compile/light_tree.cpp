@@ -1,5 +1,7 @@
 #include "compile/light_tree.h"
 
+#include "base/parallel.h"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -69,9 +71,9 @@ public:
     explicit LightTreeBuilder(const std::vector<LightBounds>& lights)
         : lights_(lights), order_(lights.size()) {
         std::iota(order_.begin(), order_.end(), 0u);
-        halves_.reserve(2 * lights.size() - 1);
+        halves_.resize(2 * lights.size() - 1);
         for (const LightBounds& light : lights) whole_ += light.power;
-        halve(0, lights.size(), 0);
+        halve(0, 0, lights.size(), 0);
         tree_.leaf_of.resize(lights.size());
         join(0, 0);
     }
@@ -86,22 +88,28 @@ private:
         std::size_t lights = 1;
     };
 
-    std::uint32_t halve(std::size_t first, std::size_t end, int depth) {
-        const auto self = static_cast<std::uint32_t>(halves_.size());
-        halves_.emplace_back();
-        Half half;
+    /// Behind a half lie those of its left part, 2 n - 1 of n lights, and then those of its right one.
+    void halve(std::uint32_t self, std::size_t first, std::size_t end, int depth) {
+        constexpr std::size_t kOfThread = 512;
+        Half& half = halves_[self];
         half.lights = end - first;
         if (half.lights == 1) {
             half.light = order_[first];
             half.bounds = lights_[half.light];
-        } else {
-            const std::size_t middle = split(first, end, depth);
-            half.left = halve(first, middle, depth + 1);
-            half.right = halve(middle, end, depth + 1);
-            half.bounds = boundsOfBoth(halves_[half.left].bounds, halves_[half.right].bounds);
+            return;
         }
-        halves_[self] = half;
-        return self;
+        const std::size_t middle = split(first, end, depth);
+        half.left = self + 1;
+        half.right = self + static_cast<std::uint32_t>(2 * (middle - first));
+        const auto left = [&] { halve(half.left, first, middle, depth + 1); };
+        const auto right = [&] { halve(half.right, middle, end, depth + 1); };
+        if (half.lights > kOfThread) {
+            parallelInvoke(left, right);
+        } else {
+            left();
+            right();
+        }
+        half.bounds = boundsOfBoth(halves_[half.left].bounds, halves_[half.right].bounds);
     }
 
     /// Up to four of the halves below one: again and again that is opened which costs most.
