@@ -61,22 +61,24 @@ TriangleBounds boundsOf(const kernel::CrtTriangle& triangle, float padding) {
 }
 
 MeshTrees compileMeshTrees(const FlatScene& flat) {
+    std::vector<Bvh> built(flat.meshes.size());
+    parallelFor(built.size(), 1, [&](std::size_t mesh, std::size_t) {
+        const FlatScene& own = flat.meshes[mesh].flat;
+        std::vector<TriangleBounds> bounds(own.triangles.size());
+        for (std::size_t i = 0; i < bounds.size(); ++i) bounds[i] = boundsOf(own, i);
+        built[mesh] = buildBvh(bounds, 0, "building the BVH of a mesh");
+    });
     MeshTrees trees;
     std::uint32_t slot = static_cast<std::uint32_t>(flat.triangles.size());
-    for (const InstancedMesh& mesh : flat.meshes) {
-        const std::size_t count = mesh.flat.triangles.size();
-        std::vector<TriangleBounds> bounds(count);
-        parallelFor(count, kPart, [&](std::size_t first, std::size_t end) {
-            for (std::size_t i = first; i < end; ++i) bounds[i] = boundsOf(mesh.flat, i);
-        });
-        Bvh bvh = buildBvh(bounds, 0, "building the BVH of a mesh");
+    for (Bvh& bvh : built) {
         const auto first_node = static_cast<std::uint32_t>(trees.nodes.size());
         for (kernel::CrtNode4& node : bvh.nodes)
             for (std::uint32_t& child : node.child) child += ((child & 15u) != 0 ? slot : first_node) << 4;
         trees.roots.push_back(first_node);
         trees.nodes.insert(trees.nodes.end(), bvh.nodes.begin(), bvh.nodes.end());
+        bvh.nodes = {};
+        slot += static_cast<std::uint32_t>(bvh.order.size());
         trees.orders.push_back(std::move(bvh.order));
-        slot += static_cast<std::uint32_t>(count);
     }
     return trees;
 }

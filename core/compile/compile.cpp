@@ -69,9 +69,11 @@ kernel::CrtSpan appendOfPrimitives(BlobWriter& blob, const FlatScene& flat,
 }
 
 /// For what grows with the number of triangles, and some tables.
-std::size_t expectedBytes(const FlatScene& flat, const AcceleratorPart& accelerator) {
+std::size_t expectedBytes(const FlatScene& flat, const AcceleratorPart& accelerator,
+                          const MeshTrees& trees) {
     constexpr std::size_t kTables = std::size_t{1} << 20;
-    return kTables + accelerator.nodes.size() * sizeof(kernel::CrtNode4) +
+    return kTables + (accelerator.nodes.size() + trees.nodes.size()) * sizeof(kernel::CrtNode4) +
+           flat.instances.size() * sizeof(kernel::CrtInstance) +
            (primitivesOf(flat) + flat.instances.size()) *
                (sizeof(kernel::CrtTriangle) + sizeof(kernel::CrtFace) + sizeof(kernel::CrtPrimitive)) +
            smoothTrianglesOf(flat) * sizeof(kernel::CrtNormals) +
@@ -101,9 +103,9 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
     AcceleratorPart accelerator = compileAccelerator(scene, flat, options);
     const std::vector<const Material*> used = usedMaterials(scene, flat);
     const std::vector<TextureIndex> textures = usedTextures(scene, used);
-    blob.reserve(expectedBytes(flat, accelerator) + texelBytes(scene, textures));
+    const MeshTrees trees = compileMeshTrees(flat);
+    blob.reserve(expectedBytes(flat, accelerator, trees) + texelBytes(scene, textures));
     header.accelerator = accelerator.kind;
-    MeshTrees trees = compileMeshTrees(flat);
     header.nodes = blob.append(accelerator.nodes);
     accelerator.nodes = {};  // they are not needed again, and they may be hundreds of megabytes
     const std::size_t count = flat.triangles.size();
