@@ -225,7 +225,7 @@ private:
                             }
                             if (!flat_.uvs.empty()) setUvs(placement, triangle, flat_.uvs[i]);
                             if (!flat_.colors.empty()) setColors(placement, triangle, flat_.colors[i]);
-                            t.smooth = placement.normals(triangle).has_value();
+                            t.smooth = placement.hasNormals(triangle);
                             part.smooth += t.smooth;
                         });
     }

@@ -81,7 +81,9 @@ double distanceOf(const Box& box, const Vec3d& way) {
 double ballAround(const std::array<Vec3d, 3>& p, const Vec3d& centre) {
     const Vec3d n = cross(p[1] - p[0], p[2] - p[0]);
     if (!(dot(n, n) > 0)) return kNowhere;  // no area, so it is invisible
-    return std::max({length(p[0] - centre), length(p[1] - centre), length(p[2] - centre)});
+    double squared = 0;
+    for (const Vec3d& corner : p) squared = std::max(squared, dot(corner - centre, corner - centre));
+    return std::sqrt(squared);
 }
 double ballAround(const Box& box, const Vec3d& centre) {
     double reach = 0;
@@ -89,7 +91,7 @@ double ballAround(const Box& box, const Vec3d& centre) {
     return reach;
 }
 
-/// Properties of a set of triangles and boxes, relative to the camera, in units of 2^exponent.
+/// Properties of a set of triangles and boxes, relative to the camera, in units of 1 / scale.
 struct Seen {
     Box box;
     double ahead = kNowhere;   ///< Distance to what the middle of the view shows.
@@ -121,8 +123,10 @@ public:
             farthest = std::max({farthest, std::abs(box.lower[k]), std::abs(box.upper[k])});
         }
         if (!(half_extent > 0) || !std::isfinite(farthest)) return std::nullopt;
-        std::frexp(half_extent, &exponent_);  // squares of lengths neither overflow nor vanish
-        half_extent = std::ldexp(half_extent, -exponent_);
+        int exponent = 0;
+        std::frexp(half_extent, &exponent);  // squares of lengths neither overflow nor vanish
+        half_extent = std::ldexp(half_extent, -exponent);
+        scale_ = std::ldexp(1.0, -exponent);
 
         const Seen here = ofAll([this](Seen& seen, const auto& thing) {
             seen.ahead = std::min(seen.ahead, distanceOf(thing, way_));
@@ -141,7 +145,7 @@ public:
             }
         }
         if (!(detail * kMostLost < half_extent)) return std::nullopt;
-        const double unit = std::ldexp(1.0, exponent_);
+        const double unit = std::ldexp(1.0, exponent);
         const Vec3d focus = eye_ + centre * unit;
         double object = wholeObject(placements_, focus) / unit;
         for (const Box& thing : boxes_)
@@ -164,7 +168,7 @@ private:
     }
 
     Box fromEye(const Box& box) const { return {fromEye(box.lower), fromEye(box.upper)}; }
-    Vec3d fromEye(const Vec3d& p) const { return (p - eye_) * std::ldexp(1.0, -exponent_); }
+    Vec3d fromEye(const Vec3d& p) const { return (p - eye_) * scale_; }
 
     /// look(seen, thing) of all triangles and boxes.
     template <class Look>
@@ -191,7 +195,7 @@ private:
     const std::vector<Box> boxes_;
     const Vec3d eye_;
     Vec3d way_{};
-    int exponent_ = 0;
+    double scale_ = 1;  ///< A power of two.
 };
 
 }  // namespace

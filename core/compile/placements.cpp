@@ -39,17 +39,24 @@ std::array<Vec3d, 3> Placement::corners(std::size_t triangle) const {
 }
 
 std::optional<std::array<Vec3d, 3>> Placement::normals(std::size_t triangle) const {
-    if (mesh->normal_index.empty()) return std::nullopt;
+    if (!hasNormals(triangle)) return std::nullopt;
     std::array<Vec3d, 3> normals;
     for (std::size_t k = 0; k < 3; ++k) {
-        const std::uint32_t index = mesh->normal_index[triangle][from(k)];
-        if (index == kNoNormal) return std::nullopt;
-        const Vec3d n = multiply(normal_matrix, mesh->normals[index]);
-        const double norm = length(n);
-        if (!(norm > 0) || !std::isfinite(norm)) return std::nullopt;
-        normals[k] = n * ((mirrored ? -1.0 : 1.0) / norm);
+        const Vec3d n = multiply(normal_matrix, mesh->normals[mesh->normal_index[triangle][from(k)]]);
+        normals[k] = n * ((mirrored ? -1.0 : 1.0) / length(n));
     }
     return normals;
+}
+
+bool Placement::hasNormals(std::size_t triangle) const {
+    if (mesh->normal_index.empty()) return false;
+    for (const std::uint32_t index : mesh->normal_index[triangle]) {
+        if (index == kNoNormal) return false;
+        const Vec3d n = multiply(normal_matrix, mesh->normals[index]);
+        const double squared = dot(n, n);
+        if (!(squared > 0) || !std::isfinite(squared)) return false;
+    }
+    return true;
 }
 
 std::uint64_t trianglesOf(const Scene& scene, const Object& object) {

@@ -33,6 +33,7 @@ struct Placement {
 
     /// Unit normals at the corners; nothing where one of them is missing or has no direction.
     std::optional<std::array<Vec3d, 3>> normals(std::size_t triangle) const;
+    bool hasNormals(std::size_t triangle) const;
 };
 
 /// Of all its places.
