@@ -11,6 +11,8 @@ import numpy as np
 from . import peer_process
 from .optics import under_coat
 
+# From Mitsuba's frame of an environment, where y is up, to Blender's, where z is.
+UPRIGHT = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])
 NEVER = 1024            # The most that Blender takes for the depth from which it plays roulette.
 FRONT = mathutils.Matrix(((-1, 0, 0, 0), (0, 1, 0, 0), (0, 0, -1, 0), (0, 0, 0, 1)))  # It looks to -z.
 
@@ -146,7 +148,6 @@ def add_environment(scene, given):
     elif given:
         image = bpy.data.images.load(given["filename"])
         image.colorspace_settings.name = "Linear Rec.709"
-        # Mitsuba's image has its middle towards +z, and y up; Blender's towards -y turned, and z up.
         turn = UPRIGHT @ np.linalg.inv(given["to_world"][:3, :3])
         angles = mathutils.Matrix(turn.tolist()).to_euler()
         seen = nodes.add("TexCoord").outputs["Generated"]
@@ -154,10 +155,6 @@ def add_environment(scene, given):
         colour = nodes.add("TexEnvironment", {"Vector": seen.outputs[0]}, image=image)
         inputs = {"Color": colour.outputs[0], "Strength": given["scale"]}
     nodes.add("OutputWorld", {"Surface": nodes.add("Background", inputs).outputs[0]})
-
-
-# From Mitsuba's frame of an environment to Blender's.
-UPRIGHT = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])
 
 
 class Cycles:
@@ -178,6 +175,7 @@ class Cycles:
         scene.camera.matrix_world = mathutils.Matrix(described["camera"].tolist()) @ FRONT
         self.film(described["size"])
         self.integrator(described["depth"], pattern, light_tree)
+        bpy.app.handlers.render_stats.append(self.note)
 
     def film(self, size):
         render = self.scene.render
@@ -209,10 +207,15 @@ class Cycles:
     def render(self, samples, seed):
         """(RGB, seconds, samples)"""
         self.scene.cycles.samples, self.scene.cycles.seed = samples, seed
-        begin = time.perf_counter()
+        self.steps = []
         bpy.ops.render.render()
-        seconds = time.perf_counter() - begin
-        return self.pixels(), seconds, samples
+        begin = next(when for when, what in self.steps if "Sample 0/" in what)
+        end = next(when for when, what in self.steps if "Finished" in what)
+        return self.pixels(), end - begin, samples
+
+    def note(self, what, *_):
+        """Blender says what it does: loading the scene, then sample after sample."""
+        self.steps.append((time.perf_counter(), str(what)))
 
     @staticmethod
     def pixels():
@@ -226,7 +229,3 @@ class Cycles:
             image.pixels.foreach_get(values)
             bpy.data.images.remove(image)
             return values.reshape(height, width, -1)[::-1, :, :3].copy()
-
-
-if __name__ == "__main__":
-    peer_process.serve(Cycles)

@@ -8,12 +8,10 @@ import pyluxcore
 from . import peer_process
 from .optics import mirrored, under_coat
 
+# From LuxCore's frame of an environment, where z is up, to Mitsuba's, where y is.
+UPRIGHT = np.array([[0.0, 1, 0], [0, 0, 1], [-1, 0, 0]])
 NEVER = 1_000_000   # The depth from which LuxCore plays roulette.
-WAIT_S = 0.0005     # Between looks at the number of samples.
-
-
-def numbers(values):
-    return " ".join(f"{float(v):.9g}" for v in values)
+WAIT_S, WAIT_SHARE = 0.001, 0.01   # Between looks at the number of samples: of the time until then.
 
 
 class Properties:
@@ -117,16 +115,12 @@ def add_environment(to, given):
                transformation=[float(v) for v in turn.T.reshape(-1)], visibilitymapcache__enable=False)
 
 
-# From LuxCore's frame of an environment to Mitsuba's.
-UPRIGHT = np.array([[0.0, 1, 0], [0, 0, 1], [1, 0, 0]])
-
-
 class LuxCore:
     """A scene in LuxCore."""
 
-    def __init__(self, described, sampler, lights):
+    def __init__(self, described, sampler):
         pyluxcore.Init(lambda text: None)
-        self.described, self.sampler, self.lights = described, sampler, lights
+        self.described, self.sampler = described, sampler
         self.scene = pyluxcore.Scene()
         to = Properties()
         for number, part in enumerate(described["parts"]):
@@ -139,9 +133,11 @@ class LuxCore:
     def add_camera(to, described):
         frame = described["camera"]
         place, ahead, up = frame[:3, 3], frame[:3, 2], frame[:3, 1]
+        pixel = 2 / described["size"]   # LuxCore's picture is one pixel too low.
         for key, value in {
             "type": "perspective", "lookat.orig": place, "lookat.target": place + ahead, "up": up,
             "fieldofview": described["fov_deg"], "autovolume.enable": False,
+            "screenwindow": np.array([-1, 1, -1 - pixel, 1 - pixel]),
         }.items():
             value = [float(v) for v in value] if isinstance(value, np.ndarray) else [value]
             to.Set(pyluxcore.Property(f"scene.camera.{key}", value))
@@ -153,7 +149,7 @@ class LuxCore:
             "renderengine.type": "PATHCPU", "renderengine.seed": seed,
             "sampler.type": self.sampler,
             "sampler.sobol.adaptive.strength": 0.0, "sampler.random.adaptive.strength": 0.0,
-            "lightstrategy.type": self.lights,
+            "lightstrategy.type": "LOG_POWER",
             "path.pathdepth.total": depth, "path.pathdepth.diffuse": depth, "path.pathdepth.glossy": depth,
             "path.pathdepth.specular": depth,
             "path.russianroulette.depth": NEVER, "path.clamping.variance.maxvalue": 0.0,
@@ -172,7 +168,7 @@ class LuxCore:
         session.Start()
         begin = time.perf_counter()
         while not session.HasDone():
-            time.sleep(WAIT_S)
+            time.sleep(max(WAIT_S, WAIT_SHARE * (time.perf_counter() - begin)))
             session.UpdateStats()
         seconds = time.perf_counter() - begin
         took = session.GetStats().Get("stats.renderengine.pass").GetInt()
@@ -181,7 +177,3 @@ class LuxCore:
         pixels = np.empty(size * size * 3, dtype=np.float32)
         session.GetFilm().GetOutputFloat(pyluxcore.FilmOutputType.RGB, pixels, 0, True)
         return pixels.reshape(size, size, 3)[::-1].copy(), seconds, took
-
-
-if __name__ == "__main__":
-    peer_process.serve(LuxCore)

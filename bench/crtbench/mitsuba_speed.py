@@ -1,45 +1,19 @@
 """Paths a second and time to an error in crt and in Mitsuba 3, scene by scene in one run."""
 
 import dataclasses
-import math
 import time
 
 import drjit as dr
 import mitsuba as mi
 
 from . import race
-from .agree import write_normals, write_picture, write_sky
-from .program import Failure, Spread
+from .contestants import Crt, Mitsuba
+from .program import Spread
+from .race_scenes import RACE, SPEED, files_of, write_inputs
 from .results import Results
 
-FOLDERS = ["bench/scenes/mitsuba_speed", "bench/scenes/race"]
+FOLDERS = [SPEED, RACE]
 SEED = 5_000_000   # Of the timed renders.
-
-
-def write_ball(path, segments=64, rings=32):
-    """A sphere of radius 1 with its normals, 2 · segments · (rings - 1) triangles."""
-    lines = []
-    for ring in range(rings + 1):
-        polar = math.pi * ring / rings
-        for segment in range(segments):
-            around = 2 * math.pi * segment / segments
-            place = (math.sin(polar) * math.cos(around), math.cos(polar), math.sin(polar) * math.sin(around))
-            text = " ".join(f"{x:.9g}" for x in place)
-            lines += [f"v {text}", f"vn {text}"]
-
-    def corner(ring, segment):
-        number = 1 + ring * segments + segment % segments
-        return f"{number}//{number}"
-
-    for ring in range(rings):
-        for segment in range(segments):
-            a, b = corner(ring, segment), corner(ring, segment + 1)
-            c, d = corner(ring + 1, segment + 1), corner(ring + 1, segment)
-            if ring > 0:
-                lines.append(f"f {a} {b} {c}")
-            if ring < rings - 1:
-                lines.append(f"f {a} {c} {d}")
-    path.write_text("\n".join(lines) + "\n")
 
 
 @dataclasses.dataclass
@@ -53,8 +27,8 @@ class Rate:
 def contestants(program, file, backend, variant, samplers, size):
     """crt first."""
     return [
-        race.Crt(program, file, backend, 1, size),
-        *(race.Mitsuba(program, file, variant, sampler, size) for sampler in samplers),
+        Crt(program, file, backend, 1, size),
+        *(Mitsuba(program, file, variant, sampler, size) for sampler in samplers),
     ]
 
 
@@ -93,22 +67,6 @@ def seconds_to_error(program, file, arguments):
     return found
 
 
-def files_of(program, only):
-    files = [f for folder in FOLDERS for f in sorted((program.repository / folder).glob("*.yaml"))]
-    if unknown := set(only or []) - {f.stem for f in files}:
-        raise Failure(f"there is no scene {sorted(unknown)[0]} in {' or '.join(FOLDERS)}")
-    return [f for f in files if not only or f.stem in only]
-
-
-def write_inputs(folder):
-    """The files of the scenes that no repository holds."""
-    write_picture(folder / "picture.png")
-    write_normals(folder / "normals.png")
-    write_sky(folder / "sky.exr")
-    race.write_sun(folder / "sun.exr")
-    write_ball(folder / "smooth_ball.obj")
-
-
 def cells(file, rated, raced):
     """One line of the table."""
     ours, theirs = best(rated, "crt"), best(rated, "Mitsuba")
@@ -133,7 +91,7 @@ def measure(program, arguments):
     write_inputs(program.scratch)
     results = Results(program, arguments, f"mitsuba-speed-{arguments.backend}", "Speed of crt and Mitsuba 3")
     begin, rows, results.data = time.monotonic(), [], {}
-    for file in files_of(program, arguments.scenes):
+    for file in files_of(program, FOLDERS, arguments.scenes):
         if rows and time.monotonic() - begin > arguments.seconds:
             print(f"{file.stem}: no time is left", flush=True)
             continue

@@ -1,6 +1,7 @@
 """The process of a renderer that `race` has beside Mitsuba: takes calls from its standard input and answers
 them on its standard output, all pickled."""
 
+import importlib
 import os
 import pickle
 import sys
@@ -10,12 +11,14 @@ class Untranslated(Exception):
     """A scene that this renderer cannot show as crt means it; a few words."""
 
 
-def serve(renderer):
-    """The first call makes the renderer, the others are its renders. Whatever else prints goes to the standard
-    error."""
+def serve(module, name):
+    """The first call makes the renderer, the others are its renders. Whatever libraries print, as soon as they
+    are loaded, goes to the standard error."""
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
-    made = None
+    from crtbench import peer_process  # The one whose exception the renderer raises.
+
+    make, made = getattr(importlib.import_module(f".{module}", __package__), name), None
     while True:
         try:
             call = pickle.load(sys.stdin.buffer)
@@ -23,11 +26,14 @@ def serve(renderer):
             return
         try:
             if made is None:
-                answer = made = renderer(**call)
-                answer = "ready"
+                made, answer = make(**call), "ready"
             else:
                 answer = made.render(**call)
-        except Untranslated as reason:
+        except peer_process.Untranslated as reason:
             answer = reason
         pickle.dump(answer, answers)
         answers.flush()
+
+
+if __name__ == "__main__":
+    serve(*sys.argv[1:])

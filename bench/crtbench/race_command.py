@@ -1,5 +1,5 @@
-"""How long do crt and Mitsuba 3 take to an error of 1 %? Scenes of bench/scenes/race, translated as for
-`agree`, are rendered by both in turn with growing numbers of samples until the error of the image is
+"""How long do crt and other renderers take to an error of 1 %? Scenes of bench/scenes/race, translated as for
+`agree`, are rendered by each in turn with growing numbers of samples until the error of the image is
 below the target; the time between the last two numbers is interpolated, never extrapolated. Times are those
 of rendering alone: scenes are loaded and kernels compiled before.
 
@@ -7,13 +7,27 @@ The error is the root of the mean over pixels and renders of the squared differe
 program's own converged image, over the mean luminance; the variance of that image is taken off. Each program
 is measured against itself, so that differences between the models do not count.
 
+The others are Mitsuba 3 and, with --peers, Blender's Cycles and LuxCore, which have three colours instead of
+spectra. --scenes may name those of bench/scenes/mitsuba_speed, too. --files takes scenes of Mitsuba, which
+crt imports: with Mitsuba alone, and with crt's Python package in the build.
+
 Needs a Python with mitsuba, numpy and PyYAML (--python), and an LLVM for Mitsuba's llvm variant."""
 
+import pathlib
+
 from .mitsuba_environment import add_python_option, under_mitsuba
+from .program import Failure
 
 
 def options(parser):
     add_python_option(parser)
+    parser.add_argument(
+        "--peers",
+        nargs="+",
+        default=["mitsuba"],
+        choices=["mitsuba", "cycles", "luxcore"],
+        help="the other renderers (mitsuba); each that is missing is installed into out/",
+    )
     parser.add_argument(
         "--backends",
         nargs="+",
@@ -53,9 +67,20 @@ def options(parser):
     )
     parser.add_argument("--name", default="race", help="of the page in --results (race)")
     parser.add_argument("--scenes", nargs="*", help="only these, by name without .yaml")
+    parser.add_argument(
+        "--files",
+        nargs="+",
+        type=pathlib.Path,
+        help="scenes of Mitsuba instead, XML; pixels in height are --size",
+    )
+    parser.add_argument(
+        "--depth", type=int, default=16, help="of --files, the most scattering events of a path (16)"
+    )
 
 
 def prepare(arguments):
+    if arguments.files and arguments.peers != ["mitsuba"]:
+        raise Failure("--files are for Mitsuba alone")
     under_mitsuba(arguments)
 
 
