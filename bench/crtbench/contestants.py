@@ -1,4 +1,5 @@
-"""crt and Mitsuba as contestants of `race` and `mitsuba-speed`: each renders a scene at a number of samples."""
+"""crt and Mitsuba as contestants of `race` and `mitsuba-speed`: each renders a scene with a number of
+samples."""
 
 import dataclasses
 import time

@@ -1,5 +1,5 @@
-"""Scenes in files of Mitsuba in `race`: Mitsuba renders the file, crt what it imports of it. Both get the same
-depth, film and filter, and no roulette."""
+"""Scenes in files of Mitsuba in `race`: Mitsuba renders the file, crt what it imports of it. Both get the
+same depth, film and filter, no roulette and no media, which crt does not have."""
 
 import os
 import subprocess
@@ -33,7 +33,7 @@ def prepared(file, target, sampler, height, depth):
     for name in root.iter("string"):
         if name.get("name") == "filename":
             name.set("value", str((file.parent / name.get("value")).resolve()))
-    for parent in root.iter():
+    for parent in list(root.iter()):
         for film in parent.findall("film"):
             width, height = resolution(film, defaults, height)
             film.clear()
@@ -43,14 +43,15 @@ def prepared(file, target, sampler, height, depth):
             element(film, "string", name="pixel_format", value="xyz")
             element(film, "string", name="component_format", value="float32")
             element(film, "rfilter", type="box")
+        for medium in parent.findall("medium"):
+            parent.remove(medium)
         for old in parent.findall("sampler"):
             old.clear()
             old.set("type", sampler)
             element(old, "integer", name="sample_count", value="16")
     integrator = root.find("integrator")
-    media = next(root.iter("medium"), None) is not None
     integrator.clear()
-    integrator.set("type", "volpath" if media else "path")
+    integrator.set("type", "path")
     # Mitsuba's depth counts the emitter, max_depth of crt does not.
     element(integrator, "integer", name="max_depth", value=str(depth + 1))
     element(integrator, "integer", name="rr_depth", value=str(NEVER))
@@ -111,5 +112,6 @@ def contestants(program, file, arguments):
     return {"crt": ours, "Mitsuba": theirs}
 
 
-def title(file):
-    return file.parent.name
+def name(file):
+    """Many files are called scene.xml."""
+    return f"{file.resolve().parent.name}/{file.stem}"

@@ -12,8 +12,8 @@ def fresnel(cosine, ior):
 
 
 def under_coat(reflectance, ior):
-    """Albedo of the layer below a plastic's surface, of the light that gets there: with what the surface throws
-    back from below, again and again."""
+    """Albedo of the layer below a plastic's surface, of the light that gets there: with what the surface
+    throws back from below, again and again."""
     cosine = (np.arange(10_000) + 0.5) / 10_000
     outside = float((2 * cosine * fresnel(cosine, ior)).mean())
     inside = 1 - (1 - outside) / ior**2

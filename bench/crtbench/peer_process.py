@@ -12,8 +12,8 @@ class Untranslated(Exception):
 
 
 def serve(module, name):
-    """The first call makes the renderer, the others are its renders. Whatever libraries print, as soon as they
-    are loaded, goes to the standard error."""
+    """The first call makes the renderer, the others are its renders. Whatever libraries print, as soon as
+    they are loaded, goes to the standard error."""
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
     from crtbench import peer_process  # The one whose exception the renderer raises.

@@ -1,5 +1,5 @@
-"""Renderers beside Mitsuba that `race` compares with crt. Each runs in a process of its own, under a Python that
-has it."""
+"""Renderers beside Mitsuba that `race` compares with crt. Each runs in a process of its own, under a Python
+that has it."""
 
 import dataclasses
 import os
@@ -29,8 +29,8 @@ class Kind:
     contestants: dict
 
 
-# Cycles' blue noise has 1.2 times the error of its tabulated Sobol points, and LuxCore's strategies for lights
-# differ by less than 1 %, in the scenes of `race`.
+# In these scenes Cycles' blue noise has 1.2 times the error of its tabulated Sobol points, and LuxCore's
+# strategies for lights differ by less than 1 % with Sobol points.
 KINDS = {
     "cycles": Kind("Cycles", "cycles", "bpy", "bpy==5.0.1", "3.11", {
         "light tree": {"pattern": "TABULATED_SOBOL", "light_tree": True},
@@ -44,7 +44,7 @@ KINDS = {
 
 
 def has(python, module):
-    asks = f"import importlib.util as u, sys; sys.exit(not (u.find_spec('{module}') and u.find_spec('numpy')))"
+    asks = f"from importlib.util import find_spec as f; exit(not (f('{module}') and f('numpy')))"
     return subprocess.run([python, "-c", asks], capture_output=True).returncode == 0
 
 

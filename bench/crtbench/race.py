@@ -106,8 +106,8 @@ def contestants_of(program, file, arguments):
 
 @dataclasses.dataclass
 class Race:
-    """Of one scene: {contestant: (points, seconds to the target or None)}, {program: its converged image}, and
-    {program: why it does not show the scene}."""
+    """Of one scene: {contestant: (points, seconds to the target or None)}, {program: its converged image},
+    and {program: why it does not show the scene}."""
 
     scene: str
     title: str
@@ -127,22 +127,23 @@ class Race:
 
 
 def race(program, file, arguments):
-    if file.suffix == ".xml":
+    if arguments.files:
+        name, title = foreign_race.name(file), "imported"
         racing, absent = foreign_race.contestants(program, file, arguments), {}
     else:
+        name, title = file.stem, agree_scene.title(file)
         racing, absent = contestants_of(program, file, arguments)
     references, found = {}, {}
-    for name, group in racing.items():
-        references[name] = Converged(group[0].render, arguments.reference_samples)
-        print(f"{file.stem}: converged image of {name}: {references[name].error:.2%} itself", flush=True)
+    for who, group in racing.items():
+        references[who] = Converged(group[0].render, arguments.reference_samples)
+        print(f"{name}: converged image of {who}: {references[who].error:.2%} itself", flush=True)
         for contestant in group:
-            points = points_to(contestant, references[name], arguments)
+            points = points_to(contestant, references[who], arguments)
             found[contestant.name] = (points, time_to(points, arguments.target))
     for contestant in sum(racing.values(), []):
         if isinstance(contestant, peers.Peer):
             contestant.close()
-    title = foreign_race.title(file) if file.suffix == ".xml" else agree_scene.title(file)
-    return Race(file.stem, title, found, references, absent)
+    return Race(name, title, found, references, absent)
 
 
 def best(found, who):
@@ -151,16 +152,15 @@ def best(found, who):
 
 
 def errors_at(found, *programs):
-    """The least error of each program at the largest number of samples that all their contestants have, after
-    that number."""
-    groups = {who: [points for name, (points, _) in found.items() if name.startswith(who)] for who in programs}
-    common = set.intersection(*({p.samples for p in points} for points in sum(groups.values(), [])))
+    """The least error of each program at the largest number of samples that all their contestants have,
+    after that number."""
+    groups = [[points for name, (points, _) in found.items() if name.startswith(who)] for who in programs]
+    common = set.intersection(*({p.samples for p in points} for points in sum(groups, [])))
     if not common:
         return None
     samples = max(common)
-    return samples, *(
-        min(p.error for points in group for p in points if p.samples == samples) for group in groups.values()
-    )
+    least = (min(p.error for points in group for p in points if p.samples == samples) for group in groups)
+    return samples, *least
 
 
 def row(scene, name, points, seconds):
@@ -228,18 +228,19 @@ def measure(program, arguments):
     begin = time.monotonic()
     for file in files:
         found = race(program, file, arguments)
-        rows += [row(file.stem, name, points, seconds) for name, (points, seconds) in found.found.items()]
+        rows += [row(found.scene, name, points, seconds) for name, (points, seconds) in found.found.items()]
         notes += sentences(found)
         claimed.append(summary(found, others))
         print(*sentences(found), sep="\n", flush=True)
-        results.data[file.stem] = {
+        results.data[found.scene] = {
             name: {"points": [dataclasses.asdict(p) for p in points], "seconds_to_target": seconds}
             for name, (points, seconds) in found.found.items()
         }
     strangers = crt.processor_seconds() - time.process_time() - crt.children_seconds() - before
     share = max(0.0, strangers) / ((time.monotonic() - begin) * os.cpu_count())
     target = f"{arguments.target:.3g}"
-    pixels = f"{arguments.size} pixels high" if arguments.files else f"{arguments.size} × {arguments.size} pixels"
+    size = arguments.size
+    pixels = f"{size} pixels high" if arguments.files else f"{size} × {size} pixels"
     where = "The files that are named" if arguments.files else f"Scenes of `{RACE}` and `{SPEED}`"
     with_what = {"Mitsuba": f" (Mitsuba is {mi.__version__})", **{
         kind.name: f" ({kind.name} is `{kind.package}`)" for kind in peers.KINDS.values()}}
