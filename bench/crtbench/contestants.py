@@ -47,7 +47,7 @@ class Crt:
             made.append(f"environment.image={self.program.scratch / around}")
         return made
 
-    def render(self, samples, seed):
+    def render(self, samples, seed, arguments=()):
         image = self.program.scratch / "race.pfm"
         settings = [
             *self.settings(),
@@ -57,7 +57,7 @@ class Crt:
         run = self.program.render(
             self.file,
             self.backend,
-            ["--spp", samples, "--seed", seed],
+            ["--spp", samples, "--seed", seed, *arguments],
             [image],
             settings,
             environment={"CRT_MESH_PATH": self.mesh_path()},
@@ -68,7 +68,8 @@ class Crt:
         return f"{self.program.scratch}:{self.program.environment['CRT_MESH_PATH']}"
 
     def warm_up(self, samples):
-        self.render(samples, WARM_UP_SEED)
+        """The kernel of the scene is compiled at once, and in the cache for all renders after this one."""
+        self.render(samples, WARM_UP_SEED, ["--kernel", "lean-only"])
         self.program.await_compilers()
 
 

@@ -71,7 +71,7 @@ def plastic(nodes, given, roughness):
 
 def pane(nodes, ior):
     """Two parallel surfaces with all reflections between them: R = 2 F / (1 + F)."""
-    behind = nodes.add("NewGeometry").outputs["Backfacing"]   # Where Blender has the inside.
+    behind = nodes.add("NewGeometry").outputs["Backfacing"]   # The inside, for Blender.
     sign = nodes.add("Math", {0: behind, 1: -2.0, 2: 1.0}, operation="MULTIPLY_ADD").outputs[0]
     outside = nodes.add("Math", {0: ior, 1: sign}, operation="POWER").outputs[0]
     once = nodes.add("Fresnel", {"IOR": outside}).outputs[0]

@@ -1,4 +1,4 @@
-"""What other renderers need to know of a dielectric surface."""
+"""Fresnel's equations, for renderers whose materials have other parameters."""
 
 import numpy as np
 

@@ -12,8 +12,8 @@ class Untranslated(Exception):
 
 
 def serve(module, name):
-    """The first call makes the renderer, the others are its renders. Whatever libraries print, as soon as
-    they are loaded, goes to the standard error."""
+    """The first call makes the renderer, the others are its renders. Text of libraries, which print as soon
+    as they are loaded, goes to the standard error."""
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
     from crtbench import peer_process  # The one whose exception the renderer raises.
@@ -23,7 +23,7 @@ def serve(module, name):
         try:
             call = pickle.load(sys.stdin.buffer)
         except EOFError:
-            return
+            os._exit(0)   # LuxCore's library crashes where Python unloads it.
         try:
             if made is None:
                 made, answer = make(**call), "ready"

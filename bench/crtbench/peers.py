@@ -1,4 +1,4 @@
-"""Renderers beside Mitsuba that `race` compares with crt. Each runs in a process of its own, under a Python
+"""Renderers beside Mitsuba that `race` compares with crt. Each runs in a separate process, under a Python
 that has it."""
 
 import dataclasses
@@ -18,8 +18,8 @@ from .program import Failure
 
 @dataclasses.dataclass
 class Kind:
-    """How a renderer is installed and started: the module that renders, what it imports, the package, the
-    Python that the package is for (any if None), and its contestants by what sets them apart."""
+    """A renderer: our module that renders, the module that it imports, the package, the Python that the
+    package is for (any if None), and the settings of its contestants by their labels."""
 
     name: str
     module: str
@@ -68,7 +68,7 @@ def python_for(kind):
 
 
 class Peer:
-    """A renderer with some settings, in its own process."""
+    """A renderer with some settings, in a separate process."""
 
     def __init__(self, described, kind, python, label):
         self.name = f"{kind.name} {label}"

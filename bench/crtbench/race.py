@@ -251,8 +251,8 @@ def measure(program, arguments):
         f"the program's own converged image, of {arguments.renders} renders, by samples a pixel. *Last*: "
         "the median of a render alone of the last number, scene loaded and kernels compiled. "
         f"*To {target}*: interpolated between the last two numbers. crt with Sobol points in one sequence, "
-        "or in two (its default, which gives the error of the image); the others with each of their samplers "
-        f"that is named. All had {processors} processors; others used {share:.0%} of the machine."
+        "or in two (its default, which gives the error of the image); the others with each of the samplers "
+        f"that are named. All had {processors} processors; others used {share:.0%} of the machine."
     )
     results.table(["Scene", "Contestant", "Errors", "Last", f"To {target}"], rows)
     for note in notes:

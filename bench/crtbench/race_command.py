@@ -1,5 +1,5 @@
-"""How long do crt and other renderers take to an error of 1 %? Scenes of bench/scenes/race, translated as for
-`agree`, are rendered by each in turn with growing numbers of samples until the error of the image is
+"""How long do crt and other renderers take to an error of 1 %? Scenes of bench/scenes/race, translated as
+for `agree`, are rendered by each in turn with growing numbers of samples until the error of the image is
 below the target; the time between the last two numbers is interpolated, never extrapolated. Times are those
 of rendering alone: scenes are loaded and kernels compiled before.
 

@@ -1,5 +1,6 @@
-"""A scene of crt for renderers of three colours, which run in processes of their own: what agree_scene makes
-for Mitsuba as numbers, names and arrays alone. Every spectrum becomes linear sRGB of the same luminance."""
+"""A scene of crt for renderers of three colours, which run in other processes: the scene that agree_scene
+makes for Mitsuba, as numbers, names and arrays alone. Every spectrum becomes linear sRGB of the same
+luminance."""
 
 import mitsuba as mi
 import numpy as np
