@@ -75,6 +75,7 @@ TEST_CASE("no option of a lean kernel relaxes arithmetic", "[embree_program]") {
         };
         CHECK(has("-ffp-contract=off"));
         CHECK(has("-march=x86-64-v3"));
+        CHECK(has("-march=x86-64-v4") == (__builtin_cpu_supports("avx512vl") != 0));
         CHECK(has("-DCRT_FEATURES=0x1851ul"));
         for (const std::string& option : options) CHECK(option.find("fast") == std::string::npos);
         const bool of_gcc = std::any_of(options.begin(), options.end(), [](const std::string& option) {

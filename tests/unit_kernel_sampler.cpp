@@ -177,6 +177,53 @@ TEST_CASE("Sobol integrates a smooth function far better than chance", "[kernel]
     CHECK(std::sqrt(squared.mean()) < 2e-4);
 }
 
+TEST_CASE("Sobol numbers of two dimensions are stratified together", "[kernel][sampler]") {
+    // 16 x y z w over the cube is 1; of 1024 independent points the estimate errs by 1.47/32 (rms). Of two
+    // nets that know nothing of each other it errs by .78/32: (4 x y - 1)(4 z w - 1) has a variance of
+    // (7/9)².
+    const auto error = [](u32 first, u32 second) {
+        Mean squared;
+        for (u32 pixel = 0; pixel < 100; ++pixel) {
+            double sum = 0;
+            for (u64 i = 0; i < 1024; ++i) {
+                const CrtRandom2 u = draw2(CRT_SAMPLER_SOBOL, 1, pixel, i, first);
+                const CrtRandom2 v = draw2(CRT_SAMPLER_SOBOL, 1, pixel, i, second);
+                sum += 16.0 * u.x * u.y * v.x * v.y;
+            }
+            squared.add((sum / 1024 - 1) * (sum / 1024 - 1));
+        }
+        return 32 * std::sqrt(squared.mean());
+    };
+    CHECK(error(1000, 1001) > 0.6);  // far along the path
+    const auto vertex = [](u32 depth, u32 dimension) { return crt_vertex_dimension(depth) + dimension; };
+    const u32 together[][2] = {
+        {CRT_DIM_FILM, vertex(0, CRT_DIM_LIGHT)},
+        {CRT_DIM_FILM, vertex(0, CRT_DIM_BSDF)},
+        {CRT_DIM_FILM, CRT_DIM_LENS},
+        {vertex(0, CRT_DIM_LIGHT), vertex(0, CRT_DIM_BSDF)},
+        {vertex(0, CRT_DIM_BSDF), vertex(0, CRT_DIM_CHOICE)},
+        {vertex(0, CRT_DIM_BSDF), vertex(1, CRT_DIM_LIGHT)},
+        {vertex(0, CRT_DIM_BSDF), vertex(1, CRT_DIM_BSDF)},
+        {vertex(1, CRT_DIM_BSDF), vertex(2, CRT_DIM_LIGHT)},
+        {vertex(2, CRT_DIM_BSDF), vertex(3, CRT_DIM_LIGHT)},
+    };
+    for (const auto& [first, second] : together) {
+        INFO(first << " and " << second);
+        CHECK(error(first, second) < 0.78 / 2);
+    }
+}
+
+TEST_CASE("each bit of a shuffled index depends on bits from there on", "[kernel][sampler]") {
+    CrtSampler s = begin(CRT_SAMPLER_SOBOL, 0, 0, 0);
+    for (u32 dimension = 0; dimension < CRT_SHUFFLED_DIMENSIONS; ++dimension)
+        for (u32 bit = 0; bit < 32; ++bit) {
+            s.index = 1u << bit;
+            const u32 column = crt_shuffled_index(&s, dimension, 0);
+            INFO(dimension << ", bit " << bit);
+            CHECK(column >> bit == 1);  // the bit itself, and none above
+        }
+}
+
 TEST_CASE("numbers lie strictly between 0 and 1", "[kernel][sampler]") {
     CHECK(crt_unit(0) == 0x1p-24f);
     CHECK(crt_unit(0xffffffffu) == 1 - 0x1p-24f);

@@ -26,7 +26,8 @@ Compiler findCompiler(const char* wanted, const char* search_path);
 /// text of kernel/schedule/pixel.h.
 std::string kernelText(const std::string& pixel_text);
 
-/// Arithmetic stays IEEE, and the instruction set that of the kernels that are compiled ahead.
+/// Arithmetic stays IEEE. The instruction set is that of the kernels that are compiled ahead, or AVX-512
+/// where this processor has it.
 std::vector<std::string> compilerOptions(const Compiler& compiler, std::uint64_t features);
 
 /// Key of the machine code: everything that decides it.

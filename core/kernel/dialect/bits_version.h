@@ -17,10 +17,11 @@
  *   8   rays pass panes, bodies know what surrounds them, small things keep their digits in large scenes
  *   9   roulette counts the panes that a path has passed
  *   10  a table has the mean reflectance of a film on a rough metal
+ *   11  Sobol points of two dimensions are stratified together
  */
 #ifndef CRT_BITS_VERSION_H
 #define CRT_BITS_VERSION_H
 
-#define CRT_BITS_VERSION 10u
+#define CRT_BITS_VERSION 11u
 
 #endif

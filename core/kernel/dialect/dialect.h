@@ -67,6 +67,7 @@ typedef float4 vec4;
 #define crt_mulhi(a, b) mul_hi((uint)(a), (uint)(b))
 #define crt_lowest_bit(u) (31u - clz((uint)(u) & (0u - (uint)(u)))) /* of a number that is not 0 */
 #define crt_sqrt4(v) sqrt((float4)(v))
+#define crt_abs4(v) fabs((float4)(v))
 #define crt_load4(p) vload4(0, (p))
 #define crt_is_finite(x) isfinite((float)(x))
 CRT_FN u32 crt_reverse_bits(u32 x) {
@@ -206,6 +207,7 @@ CRT_FN vec4 crt_load4(const f32 *p) { return *reinterpret_cast<const vec4 *>(p);
 CRT_SHARED_FN vec4 crt_sqrt4(vec4 v) {
     return make_vec4(crt_sqrt(v.x), crt_sqrt(v.y), crt_sqrt(v.z), crt_sqrt(v.w));
 }
+CRT_FN vec4 crt_abs4(vec4 v) { return make_vec4(crt_abs(v.x), crt_abs(v.y), crt_abs(v.z), crt_abs(v.w)); }
 CRT_FN vec4 crt_min4(vec4 a, vec4 b) {
     return make_vec4(a.x < b.x ? a.x : b.x, a.y < b.y ? a.y : b.y, a.z < b.z ? a.z : b.z,
                      a.w < b.w ? a.w : b.w);
@@ -323,6 +325,10 @@ CRT_FN u32 crt_reverse_bits(u32 x) {
     return __builtin_bswap32(x);
 }
 CRT_FN vec4 crt_load4(const f32 *p) { vec4 r; std::memcpy(&r, p, 16); return r; }
+CRT_FN vec4 crt_abs4(vec4 a) {
+    typedef i32 bits4 __attribute__((vector_size(16)));
+    return vec4{(crt_native4)((bits4)a.v & 0x7fffffff)};
+}
 CRT_FN vec4 crt_min4(vec4 a, vec4 b) { return vec4{a.v < b.v ? a.v : b.v}; }
 CRT_FN vec4 crt_max4(vec4 a, vec4 b) { return vec4{a.v > b.v ? a.v : b.v}; }
 CRT_FN vec4 crt_where_less4(vec4 a, vec4 b, vec4 x, vec4 y) { return vec4{a.v < b.v ? x.v : y.v}; }

@@ -8,6 +8,7 @@
 
 #include "kernel/dialect/features.h"
 #include "kernel/dialect/math.h"
+#include "kernel/sampling/shuffles.h"
 
 CRT_KERNEL_BEGIN
 
@@ -45,7 +46,7 @@ CRT_FN u32 crt_vertex_dimension(u32 depth) { return CRT_DIM_VERTEX + CRT_DIM_PER
 typedef struct CrtSampler {
     u32 kind;
     u32 pixel_key;      /* Sobol: hash of seed, pixel and sequence. Independent: the pixel */
-    u32 index;          /* low half of the sample index; bit-reversed for Sobol */
+    u32 index;          /* Sobol: in the sequence. Independent: low half of the sample index */
     u32 index_high;
     u32 seed_low, seed_high;
     u32 block;          /* Philox: which block of four numbers is in b0…b3 */
@@ -96,6 +97,11 @@ CRT_FN u32 crt_owen_reversed(u32 x, u32 seed) {
     x ^= x * 0x05526c56u;
     x ^= x * 0x53a22864u;
     return x;
+}
+
+/* Scrambles the order of indices: every aligned block of 2^k of them stays one. */
+CRT_FN u32 crt_owen_shuffled(u32 index, u32 seed) {
+    return crt_reverse_bits(crt_owen_reversed(crt_reverse_bits(index), seed));
 }
 
 /* Second Sobol dimension of an index, bit-reversed: the Pascal matrix modulo 2, applied in five steps (Ahmed
@@ -163,7 +169,8 @@ CRT_FN CrtSampler crt_sampler_begin(u32 kind, u32 replicate_shift, CrtSeed seed,
         /* A sequence has 2^32 points; samples beyond them begin another. */
         const u32 sequence = ((u32)(index >> 32) << shift) + crt_replicate(sample, shift);
         s.pixel_key = crt_pixel_key(seed, pixel, sequence);
-        s.index = crt_reverse_bits((u32)index);
+        /* Samples of the same index in two sequences are no neighbours. */
+        s.index = crt_owen_shuffled((u32)index, s.pixel_key);
     }
     if (CRT_HAS(XORSHIFT) && kind == CRT_SAMPLER_XORSHIFT) {
         /* Marsaglia's xorshift32 has one bad state, 0, and neighbouring seeds give neighbouring streams:
@@ -185,11 +192,24 @@ CRT_FN u32 crt_xorshift(CrtSampler *s) {
     return x;
 }
 
+/* The index of a Sobol sample, shuffled for a dimension: without it all dimensions would have the same
+   points but for their scrambles. In the first dimensions a matrix over GF(2) shuffles it, in eight steps,
+   which is chosen so that two dimensions, four numbers, are stratified together (bench/shuffles.cpp). In
+   the others a scramble by h does it, as if at random (Burley 2020). Both map every aligned block of 2^k
+   indices onto such a block, so that the first 2^k samples stay a net. */
+CRT_FN u32 crt_shuffled_index(const CrtSampler *s, u32 dimension, u32 h) {
+    if (dimension >= CRT_SHUFFLED_DIMENSIONS) return crt_owen_shuffled(s->index, h);
+    u32 index = s->index;
+    for (u32 step = 0u; step < CRT_SHUFFLE_STEPS; ++step)
+        index ^= (index >> (step + 1u)) & crt_shuffles[CRT_SHUFFLE_STEPS * dimension + step];
+    return index;
+}
+
 /* One number of 32 random bits. */
 CRT_FN u32 crt_sample_bits(CrtSampler *s, u32 dimension) {
     if (CRT_HAS(SOBOL) && s->kind == CRT_SAMPLER_SOBOL) {
         const u32 h = crt_hash(s->pixel_key + dimension * 0x9e3779b9u);
-        const u32 shuffled = crt_reverse_bits(crt_owen_reversed(s->index, h));
+        const u32 shuffled = crt_shuffled_index(s, dimension, h);
         return crt_reverse_bits(crt_owen_reversed(shuffled, h * 0x2c1b3c6du + 0x297a2d39u));
     }
     if (CRT_HAS(INDEPENDENT) && s->kind == CRT_SAMPLER_INDEPENDENT) {
@@ -212,18 +232,19 @@ CRT_HOT_FN f32 crt_sample_1d(CrtSampler *s, u32 dimension) {
     return crt_unit(crt_sample_bits(s, dimension));
 }
 
-/* Two numbers, stratified together: padded pairs of the first two Sobol dimensions, index shuffled and
-   values scrambled per (pixel, dimension) (Burley 2020, "Practical Hash-based Owen Scrambling"). */
+/* Two numbers, stratified together: the first two Sobol dimensions of a shuffled index, scrambled per
+   (pixel, dimension) (Burley 2020, "Practical Hash-based Owen Scrambling"). */
 CRT_HOT_FN CrtRandom2 crt_sample_2d(CrtSampler *s, u32 dimension) {
     CrtRandom2 u;
     u.x = 0.0f;
     u.y = 0.0f;
     if (CRT_HAS(SOBOL) && s->kind == CRT_SAMPLER_SOBOL) {
         const u32 h = crt_hash(s->pixel_key + dimension * 0x9e3779b9u);
-        const u32 shuffled = crt_reverse_bits(crt_owen_reversed(s->index, h));
+        const u32 shuffled = crt_shuffled_index(s, dimension, h);
         u.x = crt_unit(crt_reverse_bits(crt_owen_reversed(shuffled, h * 0x2c1b3c6du + 0x297a2d39u)));
+        /* Not h times a number, whose low bits, which flip the first digits, would be those of h. */
         u.y = crt_unit(crt_reverse_bits(
-            crt_owen_reversed(crt_sobol1_reversed(shuffled), h * 0x93d765ddu + 0x6e624eb7u)));
+            crt_owen_reversed(crt_sobol1_reversed(shuffled), crt_hash(h + 0x6e624eb7u))));
         return u;
     }
     if (CRT_HAS(INDEPENDENT) && s->kind == CRT_SAMPLER_INDEPENDENT) {

@@ -65,28 +65,23 @@ CRT_FN vec4 crt_spectrum(const CrtContext *ctx, u32 index, vec4 position) {
                        position);
 }
 
-/* ½ + x / (2√(1 + x²)). 1 / (2h(h + |x|)), with h = √(1 + x²), is the smaller of that and 1 minus
-   that: no digits cancel, also where a surface is nearly black. Six roundings: error < 6 ulp of the result,
-   or of 1 minus it. */
-CRT_FN f32 crt_sigmoid_of(f32 x) {
-    const f32 size = crt_abs(x);
-    const f32 h = crt_sqrt(crt_fma(size, size, 1.0f));
-    const f32 smaller = 0.5f / (h * (h + size));
-    return x < 0.0f ? smaller : 1.0f - smaller;
+/* ½ + x / (2√(1 + x²)) of each lane. 1 / (2h(h + |x|)), with h = √(1 + x²), is the smaller of that
+   and 1 minus that: no digits cancel, also where a surface is nearly black. Six roundings: error < 6 ulp of
+   the result, or of 1 minus it. */
+CRT_FN vec4 crt_sigmoid_of(vec4 x) {
+    const vec4 one = splat4(1.0f);
+    const vec4 size = crt_abs4(x);
+    const vec4 h = crt_sqrt4(crt_fma4(x, x, one));
+    const vec4 smaller = splat4(0.5f) / (h * (h + size));
+    return crt_where_less4(x, splat4(0.0f), smaller, one - smaller);
 }
 
 /* A reflectance of three numbers (Jakob and Hanika 2019): the sigmoid of c0 + c1 t + c2 t², t the
    wavelength as -1 (360 nm) to 1 (830 nm). */
 CRT_FN vec4 crt_sigmoid(f32 c0, f32 c1, f32 c2, vec4 position) {
     const f32 scale = 2.0f / (f32)(CRT_WAVELENGTH_COUNT - 1u);
-    const f32 t0 = crt_fma(V4X(position), scale, -1.0f);
-    const f32 t1 = crt_fma(V4Y(position), scale, -1.0f);
-    const f32 t2 = crt_fma(V4Z(position), scale, -1.0f);
-    const f32 t3 = crt_fma(V4W(position), scale, -1.0f);
-    return make_vec4(crt_sigmoid_of(crt_fma(crt_fma(c2, t0, c1), t0, c0)),
-                     crt_sigmoid_of(crt_fma(crt_fma(c2, t1, c1), t1, c0)),
-                     crt_sigmoid_of(crt_fma(crt_fma(c2, t2, c1), t2, c0)),
-                     crt_sigmoid_of(crt_fma(crt_fma(c2, t3, c1), t3, c0)));
+    const vec4 t = crt_fma4(position, splat4(scale), splat4(-1.0f));
+    return crt_sigmoid_of(crt_fma4(crt_fma4(splat4(c2), t, splat4(c1)), t, splat4(c0)));
 }
 
 /* (x̄, ȳ, z̄, 0) / ∫ȳ at one wavelength. */
