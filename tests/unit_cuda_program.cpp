@@ -4,13 +4,24 @@
 
 #include "catch.h"
 #include "cuda_nvrtc.h"
+#include "cuda_precompiled.h"
 #include "cuda_program.h"
 
 #include <algorithm>
+#include <cstring>
+#include <fstream>
+#include <iterator>
 #include <set>
 #include <stdexcept>
 
 using namespace crt::cuda;
+
+TEST_CASE("the precompiled kernel is the one that nvcc has made in this build", "[cuda]") {
+    std::ifstream file(CRT_BUILD_DIR "/plugins/cuda/kernels.fatbin", std::ios::binary);
+    const std::string made((std::istreambuf_iterator<char>(file)), {});
+    REQUIRE(made.size() > 10000);
+    CHECK(std::memcmp(kPrecompiledKernels, made.data(), made.size()) == 0);
+}
 
 TEST_CASE("NVRTC is looked for by name, in CUDA_HOME, then in the usual place", "[cuda]") {
     const std::vector<std::string> plain = nvrtcCandidates(nullptr);

@@ -242,9 +242,10 @@ CRT_HOT_FN CrtRandom2 crt_sample_2d(CrtSampler *s, u32 dimension) {
         const u32 h = crt_hash(s->pixel_key + dimension * 0x9e3779b9u);
         const u32 shuffled = crt_shuffled_index(s, dimension, h);
         u.x = crt_unit(crt_reverse_bits(crt_owen_reversed(shuffled, h * 0x2c1b3c6du + 0x297a2d39u)));
-        /* Not h times a number, whose low bits, which flip the first digits, would be those of h. */
+        /* Its low bits, which flip the first digits, differ from those of x. */
+        const u32 swapped = (h >> 16) | (h << 16);
         u.y = crt_unit(crt_reverse_bits(
-            crt_owen_reversed(crt_sobol1_reversed(shuffled), crt_hash(h + 0x6e624eb7u))));
+            crt_owen_reversed(crt_sobol1_reversed(shuffled), swapped * 0x93d765ddu + 0x6e624eb7u)));
         return u;
     }
     if (CRT_HAS(INDEPENDENT) && s->kind == CRT_SAMPLER_INDEPENDENT) {
