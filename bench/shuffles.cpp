@@ -1,4 +1,4 @@
-// Finds the masks of core/kernel/sampling/shuffles.h, and prints that file (in half a minute).
+// Finds the masks of core/kernel/sampling/shuffles.h, and prints that file (in two minutes).
 //
 // Each pair of Sobol numbers of a sample is a point of a (0,2)-sequence, whose index is first shuffled by a
 // matrix over GF(2): index ^= (index >> s) & mask[s] for s = 1 … 8. All such matrices keep the pair a

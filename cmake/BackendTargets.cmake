@@ -1,5 +1,6 @@
 # The targets that a backend links, with the same names in this tree and in an installed one:
-#   crt::backend_headers  backend/crt_backend.h, backend/sdk/*.h, the layout hash, kernel/*/*.h
+#   crt::backend_headers  backend/crt_backend.h, backend/sdk/*.h, the layout hash, kernel/*/*.h,
+#                         system/*.h
 #   crt::kernel_cache     backend/sdk/kernel_cache.h and compile_process.h and their code, to be linked
 #                         into the plugin
 

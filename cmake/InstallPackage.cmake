@@ -32,6 +32,8 @@ install(FILES
   DESTINATION include/crt/backend)
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/core/backend/sdk/ DESTINATION include/crt/backend/sdk FILES_MATCHING
   PATTERN "*.h")
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/core/system/ DESTINATION include/crt/system FILES_MATCHING PATTERN
+  "*.h")
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/core/kernel/ DESTINATION include/crt/kernel FILES_MATCHING PATTERN
   "*.h")
 

@@ -1,8 +1,8 @@
 /// Memory of many megabytes, which the system takes longer to give than a program to fill.
 #pragma once
 
-#include "base/huge_pages.h"
 #include "base/parallel.h"
+#include "system/huge_pages.h"
 
 #include <cstddef>
 

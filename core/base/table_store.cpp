@@ -24,7 +24,7 @@ TableStore::~TableStore() {
 FileCache::Key TableStore::keyOf(std::string_view kind, const std::vector<double>& inputs) const {
     const std::string_view numbers(reinterpret_cast<const char*>(inputs.data()),
                                    inputs.size() * sizeof(double));
-    return FileCache::makeKey({"table of materials", build_, kind, numbers});
+    return FileCache::makeKey({"table", build_, kind, numbers});
 }
 
 std::string TableStore::path(std::string_view kind, const std::vector<double>& inputs) const {

@@ -4,6 +4,7 @@
 #include "compile/accelerator.h"
 #include "compile/context_of.h"
 #include "compile/coplanar.h"
+#include "compile/grid_cells.h"
 #include "compile/near_surfaces.h"
 #include "kernel/geometry/slots.h"
 #include "kernel/geometry/surface.h"
@@ -59,7 +60,7 @@ public:
         for (std::size_t level = 0; level < levels_.size(); ++level) {
             const std::vector<std::uint32_t>& places = levels_[level];
             if (places.empty()) continue;
-            const Range range = rangeOf(box, level);
+            const CellRange range = rangeOf(box, level);
             if (range.cells() > places.size()) {
                 for (const std::uint32_t i : places) look(i);
                 continue;
@@ -73,37 +74,16 @@ public:
     }
 
 private:
-    struct Range {
-        std::array<std::uint32_t, 3> first, last;
-        std::uint64_t cells() const {
-            std::uint64_t product = 1;
-            for (std::size_t k = 0; k < 3; ++k) product *= last[k] - first[k] + 1;
-            return product;
-        }
-    };
-
-    Range rangeOf(const TriangleBounds& box, std::size_t level) const {
-        const float side = std::ldexp(side_, -static_cast<int>(level));
-        const auto cell = [&](float x) {
-            return static_cast<std::uint32_t>(std::clamp((x + 1) * 0.5f * side, 0.0f, side - 1));
-        };
-        Range range{};
-        for (std::size_t k = 0; k < 3; ++k) {
-            range.first[k] = cell(box.lower[k]);
-            range.last[k] = cell(box.upper[k]);
-        }
-        return range;
+    CellRange rangeOf(const TriangleBounds& box, std::size_t level) const {
+        return cellsOf(box, std::ldexp(side_, -static_cast<int>(level)));
     }
 
     template <class Visit>
-    void forEachCell(const Range& range, std::size_t level, const Visit& visit) const {
-        for (std::uint32_t z = range.first[2]; z <= range.last[2]; ++z)
-            for (std::uint32_t y = range.first[1]; y <= range.last[1]; ++y)
-                for (std::uint32_t x = range.first[0]; x <= range.last[0]; ++x) {
-                    const std::uint64_t cell =
-                        std::uint64_t{level + 1} << 30 | std::uint64_t{z} << 20 | std::uint64_t{y} << 10 | x;
-                    visit(cell * 0x9e3779b97f4a7c15ull >> (64 - log_buckets_));  // Fibonacci hashing
-                }
+    void forEachCell(const CellRange& range, std::size_t level, const Visit& visit) const {
+        anyCell(range, [&](std::uint64_t cell) {
+            visit(cellHash(std::uint64_t{level + 1} << 30 | cell, log_buckets_));
+            return false;
+        });
     }
 
     std::vector<Asked> asked_;
@@ -165,8 +145,7 @@ private:
         kernel::CrtShear shear;
     };
 
-    /// As of near_scene.cpp: nothing is reached from farther away.
-    float reach() const { return 2 * largest_ + 64 * CRT_EPSILON; }
+    float reach() const { return reachOf(largest_); }
     std::vector<Asked> askedPlaces();
     std::vector<TriangleBounds> typicalBoxes() const;
     bool isCoplanar(const Asked& light, std::uint32_t other) const;
@@ -196,23 +175,14 @@ Pairs::Pairs(const CompiledScene& scene)
 /// Without nodes a triangle's slot is its id.
 std::vector<Asked> Pairs::askedPlaces() {
     std::vector<Asked> all;
-    const std::uint64_t step = askedEmitterStep(scene_.emitters);
-    for (std::uint32_t slot = 0; slot < count_ && scene_.emitters > 0; ++slot) {
-        const std::uint32_t emitter = primitives_[triangles_[slot].id].light;
-        if (emitter != CRT_NONE && emitter % step == 0)
-            all.push_back({boundsOf(triangles_[slot], reach()), slot, CRT_NONE});
-    }
+    for (const std::uint32_t slot : askedEmitters(scene_))
+        all.push_back({boundsOf(triangles_[slot], reach()), slot, CRT_NONE});
     if (context_.scene->max_depth == 0) return all;
     for (const std::uint32_t slot : askedTriangles(scene_.triangles)) {
         const auto rays = normalRays(context_, slot, largest_);
         if (!rays) continue;
-        TriangleBounds middle{};
-        for (std::size_t k = 0; k < 3; ++k) {
-            const float* p = triangles_[slot].p + 3 * k;
-            middle.lower[k] = (p[0] + p[1] + p[2]) / 3 - reach();
-            middle.upper[k] = (p[0] + p[1] + p[2]) / 3 + reach();
-        }
-        all.push_back({middle, slot, static_cast<std::uint32_t>(rays_.size())});
+        all.push_back(
+            {aroundMiddle(triangles_[slot], reach()), slot, static_cast<std::uint32_t>(rays_.size())});
         for (const NormalRay& from : *rays) {
             rays_.push_back({from, kernel::crt_shear(from.ray)});
             slots_.push_back(slot);

@@ -5,6 +5,7 @@
 #include "compile/accelerator.h"
 #include "compile/blob_writer.h"
 #include "compile/bvh_build.h"
+#include "compile/grid_cells.h"
 #include "compile/near_surfaces.h"
 #include "kernel/geometry/surface.h"
 
@@ -36,10 +37,11 @@ public:
 
     /// Returns false if the search is pointless because too many cells are marked.
     bool mark(const TriangleBounds& box) {
-        const Range range = rangeOf(box);
+        const CellRange range = cellsOf(box, side_);
         marked_ += range.cells();
         if (marked_ > kMostMarked) return false;
-        forEach(range, [&](std::uint64_t bit) {
+        anyCell(range, [&](std::uint64_t cell) {
+            const std::uint64_t bit = cellHash(cell + 1, kLogBits);
             bits_[bit / 64] |= std::uint64_t{1} << bit % 64;
             return false;
         });
@@ -47,9 +49,11 @@ public:
     }
 
     bool anyMarked(const TriangleBounds& box) const {
-        const Range range = rangeOf(box);
-        return range.cells() > kMostLooks ||
-               forEach(range, [&](std::uint64_t bit) { return (bits_[bit / 64] >> bit % 64 & 1) != 0; });
+        const CellRange range = cellsOf(box, side_);
+        return range.cells() > kMostLooks || anyCell(range, [&](std::uint64_t cell) {
+                   const std::uint64_t bit = cellHash(cell + 1, kLogBits);
+                   return (bits_[bit / 64] >> bit % 64 & 1) != 0;
+               });
     }
 
 private:
@@ -57,40 +61,6 @@ private:
     static constexpr std::uint64_t kBits = std::uint64_t{1} << kLogBits;
     static constexpr std::uint64_t kMostMarked = kBits / 16;
     static constexpr std::uint64_t kMostLooks = 4096;
-
-    struct Range {
-        std::array<std::uint32_t, 3> first, last;
-        std::uint64_t cells() const {
-            std::uint64_t product = 1;
-            for (std::size_t k = 0; k < 3; ++k) product *= last[k] - first[k] + 1;
-            return product;
-        }
-    };
-
-    Range rangeOf(const TriangleBounds& box) const {
-        const auto cell = [&](float x) {
-            return static_cast<std::uint32_t>(std::clamp((x + 1) * 0.5f * side_, 0.0f, side_ - 1));
-        };
-        Range range{};
-        for (std::size_t k = 0; k < 3; ++k) {
-            range.first[k] = cell(box.lower[k]);
-            range.last[k] = cell(box.upper[k]);
-        }
-        return range;
-    }
-
-    /// Until `visit` returns true; whether it did.
-    template <class Visit>
-    static bool forEach(const Range& range, const Visit& visit) {
-        for (std::uint32_t z = range.first[2]; z <= range.last[2]; ++z)
-            for (std::uint32_t y = range.first[1]; y <= range.last[1]; ++y)
-                for (std::uint32_t x = range.first[0]; x <= range.last[0]; ++x) {
-                    const std::uint64_t cell = (std::uint64_t{z} << 20 | std::uint64_t{y} << 10 | x) + 1;
-                    if (visit(cell * 0x9e3779b97f4a7c15ull >> (64 - kLogBits)))
-                        return true;  // Fibonacci hashing
-                }
-        return false;
-    }
 
     float side_;
     std::uint64_t marked_ = 0;
@@ -101,29 +71,16 @@ private:
 std::vector<std::uint32_t> slotsNearAsked(const CompiledScene& scene, const kernel::CrtScene& header) {
     const auto* triangles = CRT_ARRAY(CrtTriangle, scene.data(), header.triangles);
     const auto* faces = CRT_ARRAY(CrtFace, scene.data(), header.faces);
-    const auto* primitives = CRT_ARRAY(CrtPrimitive, scene.data(), header.primitives);
     const std::uint32_t count = header.triangle_count;
-    const float largest = largestClearance(faces, count);
-    // All surfaces that near_surfaces.h reaches lie within this distance of the triangle: rays go as far as
-    // the largest clearance, and begin some epsilon off.
-    const float reach = 2 * largest + 64 * CRT_EPSILON;
+    const float reach = reachOf(largestClearance(faces, count));
 
     MarkedCells cells(count);
-    const std::uint64_t step = askedEmitterStep(scene.emitters);
     bool all = false;
-    for (std::uint32_t slot = 0; slot < count && scene.emitters > 0 && !all; ++slot) {
-        const std::uint32_t emitter = primitives[triangles[slot].id].light;
-        if (emitter != CRT_NONE && emitter % step == 0) all = !cells.mark(boundsOf(triangles[slot], reach));
-    }
-    for (const std::uint32_t id : askedTriangles(scene.triangles)) {
-        TriangleBounds middle{};
-        for (std::size_t k = 0; k < 3; ++k) {
-            const float* p = triangles[id].p + 3 * k;  // without nodes a triangle's slot is its id
-            middle.lower[k] = (p[0] + p[1] + p[2]) / 3 - reach;
-            middle.upper[k] = (p[0] + p[1] + p[2]) / 3 + reach;
-        }
-        all = !cells.mark(middle) || all;
-    }
+    // Without nodes a triangle's slot is its id.
+    for (const std::uint32_t id : askedEmitters(scene))
+        all = all || !cells.mark(boundsOf(triangles[id], reach));
+    for (const std::uint32_t id : askedTriangles(scene.triangles))
+        all = all || !cells.mark(aroundMiddle(triangles[id], reach));
     std::vector<std::vector<std::uint32_t>> parts(partsOf(count, kSlotsAtOnce));
     parallelFor(count, kSlotsAtOnce, [&](std::size_t first, std::size_t end) {
         for (std::size_t slot = first; slot < end; ++slot)

@@ -134,8 +134,25 @@ float largestClearance(const kernel::CrtFace* faces, std::size_t count) {
     return largest.empty() ? 0.0f : *std::max_element(largest.begin(), largest.end());
 }
 
-std::uint64_t askedEmitterStep(std::uint64_t emitters) {
-    return std::max<std::uint64_t>(1, emitters / kEmitters);
+std::vector<std::uint32_t> askedEmitters(const CompiledScene& scene) {
+    std::vector<std::uint32_t> ids;
+    if (scene.emitters == 0) return ids;
+    const kernel::CrtContext context = contextOf(scene);
+    const auto* primitives = CRT_ARRAY(kernel::CrtPrimitive, context.blob, context.scene->primitives);
+    const std::uint64_t step = std::max<std::uint64_t>(1, scene.emitters / kEmitters);
+    for (std::uint32_t id = 0; id < scene.triangles + scene.shapes; ++id)  // Instances emit nothing.
+        if (primitives[id].light != CRT_NONE && primitives[id].light % step == 0) ids.push_back(id);
+    return ids;
+}
+
+TriangleBounds aroundMiddle(const kernel::CrtTriangle& triangle, float reach) {
+    TriangleBounds bounds{};
+    for (std::size_t k = 0; k < 3; ++k) {
+        const float* p = triangle.p + 3 * k;
+        bounds.lower[k] = (p[0] + p[1] + p[2]) / 3 - reach;
+        bounds.upper[k] = (p[0] + p[1] + p[2]) / 3 + reach;
+    }
+    return bounds;
 }
 
 std::optional<CoplanarLight> findCoplanarLight(const CompiledScene& scene) {
@@ -143,18 +160,15 @@ std::optional<CoplanarLight> findCoplanarLight(const CompiledScene& scene) {
     const CrtContext context = contextOf(scene);
     const auto* triangles = CRT_ARRAY(CrtTriangle, context.blob, context.scene->triangles);
     const auto* primitives = CRT_ARRAY(CrtPrimitive, context.blob, context.scene->primitives);
-    const std::uint64_t step = askedEmitterStep(scene.emitters);
-    std::vector<std::uint32_t> lights;  // Slots, in the order of ids.
-    if (scene.emitters > 0)
-        for (const std::uint32_t slot : slotsOf(scene, context)) {
-            const std::uint32_t emitter = slot != CRT_NONE ? primitives[triangles[slot].id].light : CRT_NONE;
-            if (emitter != CRT_NONE && emitter % step == 0) lights.push_back(slot);
-        }
+    std::vector<std::uint32_t> lights = askedEmitters(scene);
+    if (lights.empty()) return std::nullopt;
+    const std::vector<std::uint32_t> slots = slotsOf(scene, context);
+    std::erase_if(lights, [&](std::uint32_t id) { return slots[id] == CRT_NONE; });
     std::uint64_t tests = kTriangleTests;
     std::optional<CoplanarLight> found;
     const EvenOrder order(lights.size());
     for (std::uint64_t i = 0; i < lights.size() && !found && tests > 0; ++i) {
-        const std::uint32_t slot = lights[order[i]];
+        const std::uint32_t slot = slots[lights[order[i]]];
         const CrtPrimitive& light = primitives[triangles[slot].id];
         const Corners own = cornersOf(context.blob, slot);
         Box box;

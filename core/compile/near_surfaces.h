@@ -2,6 +2,7 @@
 /// start is known.
 #pragma once
 
+#include "compile/bvh_build.h"
 #include "compile/compile.h"
 #include "kernel/dialect/context.h"
 #include "kernel/dialect/layout.h"
@@ -26,11 +27,17 @@ struct NearSurfaces {
 
 /// Ids of the triangles that findNearSurfaces asks about, in its order.
 std::vector<std::uint32_t> askedTriangles(std::uint64_t triangles);
-/// findCoplanarLight asks about emitters whose numbers are multiples of this.
-std::uint64_t askedEmitterStep(std::uint64_t emitters);
+/// Ids of the triangles of emitters that findCoplanarLight asks about: all, or an even choice of them.
+std::vector<std::uint32_t> askedEmitters(const CompiledScene& scene);
 
 /// Of this number of faces; 0 if there are none.
 float largestClearance(const kernel::CrtFace* faces, std::size_t count);
+
+/// The distance from a triangle within which all surfaces lie that are near to it: rays go as far as the
+/// largest clearance, and begin some epsilon off.
+inline float reachOf(float largest_clearance) { return 2 * largest_clearance + 64 * CRT_EPSILON; }
+/// The middle of a triangle, and `reach` to all sides.
+TriangleBounds aroundMiddle(const kernel::CrtTriangle& triangle, float reach);
 
 /// A ray by which findNearSurfaces looks for neighbours of a triangle.
 struct NormalRay {

@@ -1,6 +1,6 @@
 #include "image/png_reader.h"
 
-#include "base/huge_pages.h"
+#include "system/huge_pages.h"
 
 #include <libdeflate.h>
 

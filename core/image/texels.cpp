@@ -2,12 +2,12 @@
 
 #include "base/error.h"
 #include "base/host.h"
-#include "base/huge_pages.h"
 #include "base/input_file.h"
 #include "image/image_io.h"
 #include "image/memory_bound.h"
 #include "image/open_module.h"
 #include "spectra/spectra.h"
+#include "system/huge_pages.h"
 
 #include <fmt/format.h>
 

@@ -1,6 +1,7 @@
 #include "embree_integrator.h"
 
 #include "kernel/dialect/features.h"
+#include "system/huge_pages.h"
 
 #include <algorithm>
 #include <atomic>
@@ -8,8 +9,6 @@
 #include <cstring>
 #include <fstream>
 #include <mutex>
-
-#include <sys/mman.h>
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
@@ -31,15 +30,6 @@ std::string processorName() {
         if (line.rfind("model name", 0) == 0 && line.find(':') != std::string::npos)
             return line.substr(line.find(':') + 2);
     return "CPU";
-}
-
-/// Asks the system for pages of 2 MiB: it takes longer to give the others than this plugin to fill them.
-void adviseHugePages(void* memory, std::size_t bytes) {
-    constexpr std::uintptr_t kHugePage = std::uintptr_t{2} << 20;
-    const auto address = reinterpret_cast<std::uintptr_t>(memory);
-    const std::uintptr_t first = (address + kHugePage - 1) & ~(kHugePage - 1),
-                         end = (address + bytes) & ~(kHugePage - 1);
-    if (first < end) (void)::madvise(reinterpret_cast<void*>(first), end - first, MADV_HUGEPAGE);
 }
 
 /// The kernels are compiled for AVX2 and FMA (x86-64-v3).

@@ -46,7 +46,7 @@ CRT_FN u32 crt_vertex_dimension(u32 depth) { return CRT_DIM_VERTEX + CRT_DIM_PER
 typedef struct CrtSampler {
     u32 kind;
     u32 pixel_key;      /* Sobol: hash of seed, pixel and sequence. Independent: the pixel */
-    u32 index;          /* Sobol: in the sequence. Independent: low half of the sample index */
+    u32 index;          /* Sobol: in the sequence, shuffled. Independent: low half of the sample index */
     u32 index_high;
     u32 seed_low, seed_high;
     u32 block;          /* Philox: which block of four numbers is in b0…b3 */
@@ -99,9 +99,14 @@ CRT_FN u32 crt_owen_reversed(u32 x, u32 seed) {
     return x;
 }
 
+/* Owen scrambling of a number whose bits are given in reverse. */
+CRT_HOT_FN u32 crt_owen_scrambled(u32 reversed, u32 seed) {
+    return crt_reverse_bits(crt_owen_reversed(reversed, seed));
+}
+
 /* Scrambles the order of indices: every aligned block of 2^k of them stays one. */
 CRT_FN u32 crt_owen_shuffled(u32 index, u32 seed) {
-    return crt_reverse_bits(crt_owen_reversed(crt_reverse_bits(index), seed));
+    return crt_owen_scrambled(crt_reverse_bits(index), seed);
 }
 
 /* Second Sobol dimension of an index, bit-reversed: the Pascal matrix modulo 2, applied in five steps (Ahmed
@@ -169,7 +174,8 @@ CRT_FN CrtSampler crt_sampler_begin(u32 kind, u32 replicate_shift, CrtSeed seed,
         /* A sequence has 2^32 points; samples beyond them begin another. */
         const u32 sequence = ((u32)(index >> 32) << shift) + crt_replicate(sample, shift);
         s.pixel_key = crt_pixel_key(seed, pixel, sequence);
-        /* Samples of the same index in two sequences are no neighbours. */
+        /* Otherwise the samples of an index would have the same points in all sequences, but for their
+           scrambles. */
         s.index = crt_owen_shuffled((u32)index, s.pixel_key);
     }
     if (CRT_HAS(XORSHIFT) && kind == CRT_SAMPLER_XORSHIFT) {
@@ -210,7 +216,7 @@ CRT_FN u32 crt_sample_bits(CrtSampler *s, u32 dimension) {
     if (CRT_HAS(SOBOL) && s->kind == CRT_SAMPLER_SOBOL) {
         const u32 h = crt_hash(s->pixel_key + dimension * 0x9e3779b9u);
         const u32 shuffled = crt_shuffled_index(s, dimension, h);
-        return crt_reverse_bits(crt_owen_reversed(shuffled, h * 0x2c1b3c6du + 0x297a2d39u));
+        return crt_owen_scrambled(shuffled, h * 0x2c1b3c6du + 0x297a2d39u);
     }
     if (CRT_HAS(INDEPENDENT) && s->kind == CRT_SAMPLER_INDEPENDENT) {
         if (s->block != (dimension >> 1)) {
@@ -241,11 +247,11 @@ CRT_HOT_FN CrtRandom2 crt_sample_2d(CrtSampler *s, u32 dimension) {
     if (CRT_HAS(SOBOL) && s->kind == CRT_SAMPLER_SOBOL) {
         const u32 h = crt_hash(s->pixel_key + dimension * 0x9e3779b9u);
         const u32 shuffled = crt_shuffled_index(s, dimension, h);
-        u.x = crt_unit(crt_reverse_bits(crt_owen_reversed(shuffled, h * 0x2c1b3c6du + 0x297a2d39u)));
+        u.x = crt_unit(crt_owen_scrambled(shuffled, h * 0x2c1b3c6du + 0x297a2d39u));
         /* Its low bits, which flip the first digits, differ from those of x. */
         const u32 swapped = (h >> 16) | (h << 16);
-        u.y = crt_unit(crt_reverse_bits(
-            crt_owen_reversed(crt_sobol1_reversed(shuffled), swapped * 0x93d765ddu + 0x6e624eb7u)));
+        u.y =
+            crt_unit(crt_owen_scrambled(crt_sobol1_reversed(shuffled), swapped * 0x93d765ddu + 0x6e624eb7u));
         return u;
     }
     if (CRT_HAS(INDEPENDENT) && s->kind == CRT_SAMPLER_INDEPENDENT) {
