@@ -123,7 +123,8 @@ private:
             array<CrtEnvironmentTexel>(image.texels);
             array<u32>(image.rows);
             array<u32>(image.columns);
-            image.texels = image.rows = image.columns = {};
+            // The guides follow from these.
+            image.texels = image.rows = image.columns = image.row_guide = image.column_guides = {};
             add(image);
         });
     }

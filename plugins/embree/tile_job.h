@@ -56,3 +56,5 @@ using RenderTile = RayTotals (*)(const TileJob& job);
 // The kernels of this backend carry the root along, and trace with it (kernels.h).
 #define CRT_CONTEXT_EXTRA crt::embree::Child tree;
 #define CRT_BACKEND_TRACE
+// Two pixels take turns (kernels.h).
+#define CRT_TAKES_TURNS 1

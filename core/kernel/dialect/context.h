@@ -13,6 +13,10 @@ CRT_KERNEL_BEGIN
 #ifndef CRT_CONTEXT_EXTRA
 #define CRT_CONTEXT_EXTRA
 #endif
+/* 1: a processor works on the vertices of several paths in turn, and fetches from memory meanwhile. */
+#ifndef CRT_TAKES_TURNS
+#define CRT_TAKES_TURNS 0
+#endif
 typedef struct CrtContext {
     CRT_GLOBAL const CRT_BYTE *blob;
     CRT_GLOBAL const CrtScene *scene;

@@ -92,6 +92,7 @@ CRT_FN vec4 crt_where_less4(vec4 a, vec4 b, vec4 x, vec4 y) { return select(y, x
 #define CRT_ROLLED _Pragma("unroll 1")
 #define CRT_TWICE _Pragma("unroll 2")
 #define crt_fast_reciprocal(x) (1.0f / (x))
+#define CRT_FETCH(p) ((void)(p)) /* PoCL's prefetch() does nothing */
 #ifndef CRT_SIMD8
 #define CRT_SIMD8 1
 #endif
@@ -239,6 +240,7 @@ CRT_FN vec4 crt_where_less4(vec4 a, vec4 b, vec4 x, vec4 y) {
 #define CRT_ROLLED _Pragma("unroll 1")
 #define CRT_TWICE _Pragma("unroll 2")
 #endif
+#define CRT_FETCH(p) ((void)(p)) /* other warps work meanwhile */
 #define CRT_SIMD8 0
 #define CRT_ASSERT_SIZE(type, bytes) static_assert(sizeof(type) == (bytes), "layout of " #type)
 
@@ -307,6 +309,7 @@ CRT_FN vec4 operator/(vec4 a, f32 s) { return vec4{a.v / s}; }
 CRT_FN u32 crt_atomic_carry(u64 *word, u64 n) {
     return __atomic_fetch_add(word, n, __ATOMIC_RELAXED) + n < n ? 1u : 0u;
 }
+#define CRT_FETCH(p) __builtin_prefetch(p) /* begins to bring what is at `p` into the cache */
 CRT_FN f32 crt_fma(f32 a, f32 b, f32 c) { return __builtin_fmaf(a, b, c); }
 CRT_FN f32 crt_sqrt(f32 x) { return __builtin_sqrtf(x); }
 CRT_FN f32 crt_abs(f32 x) { return __builtin_fabsf(x); }

@@ -406,16 +406,21 @@ typedef struct CrtEnvironmentTexel {
 CRT_ASSERT_SIZE(CrtEnvironmentTexel, 16);
 
 /* Latitudes and longitudes. Rows go from `up` down; columns to the right as seen from within, the middle one
-   `ahead`. A 32-bit number u chooses the last row with rows ≤ u, and another a column of it. */
+   `ahead`. A 32-bit number u chooses the last row with rows ≤ u, and another a column of it. A guide says
+   which item each multiple of 2^shift chooses, and ends with the last item: between two such are the items
+   that are searched. It has a part for 16 items or more, which a line of a processor's cache holds. */
 typedef struct CrtEnvironmentImage {
     u32 width, height;
-    CrtSpan texels;   /* CrtEnvironmentTexel, row by row */
-    CrtSpan rows;     /* u32, height of them */
-    CrtSpan columns;  /* u32, width of them for each row */
+    CrtSpan texels;        /* CrtEnvironmentTexel, row by row */
+    CrtSpan rows;          /* u32, height of them */
+    CrtSpan columns;       /* u32, width of them for each row */
+    CrtSpan row_guide;     /* u32, 2^(32 - row_shift) + 1 of them */
+    CrtSpan column_guides; /* u32, 2^(32 - column_shift) + 1 of them for each row */
+    u32 row_shift, column_shift;
     f32 right[3], up[3], ahead[3]; /* unit, perpendicular to each other */
-    u32 reserved[3];
+    u32 reserved;
 } CrtEnvironmentImage;
-CRT_ASSERT_SIZE(CrtEnvironmentImage, 80);
+CRT_ASSERT_SIZE(CrtEnvironmentImage, 96);
 
 /* The spectral channels of a film, behind all others: the mean radiance in equal bins of wavelengths, then
    the radiance weighted by the responses of sensors. */

@@ -94,6 +94,7 @@ CRT_FN int crt_path_advance_passing(const CrtContext *ctx, CrtPath *path, CrtRay
 CRT_FN int crt_path_advance(const CrtContext *ctx, CrtPath *path, const CrtFilmPixel *film,
                             CrtRayCount *rays) {
     (void)film;
+    if (crt_has_left(ctx, path)) return 0;
     if (CRT_HAS(OPACITY) || CRT_HAS(THIN_DIELECTRIC)) return crt_path_advance_passing(ctx, path, rays);
     CrtShadow shadow;
     rays->closest += 1u;

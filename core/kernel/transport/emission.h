@@ -46,10 +46,9 @@ CRT_FN void crt_add_emission(const CrtContext *ctx, CrtPath *path, const CrtSurf
     crt_add_radiance(path, path->throughput * emitted * weight);
 }
 
-/* Radiance of the environment, weighted in the same way. */
-CRT_FN void crt_add_environment(const CrtContext *ctx, CrtPath *path) {
+/* Radiance of the environment at `place`, which the ray leads to, weighted in the same way. */
+CRT_FN void crt_add_environment(const CrtContext *ctx, CrtPath *path, CrtEnvironmentPlace place) {
     CRT_GLOBAL const CrtScene *scene = ctx->scene;
-    const CrtEnvironmentPlace place = crt_environment_towards(ctx, path->ray.d);
     f32 weight = 1.0f;
     if (CRT_HAS(ENVIRONMENT_LIGHT) && scene->environment_light != 0u && scene->nee != CRT_NEE_NONE &&
         path->scatter_pdf > 0.0f) {
@@ -61,13 +60,35 @@ CRT_FN void crt_add_environment(const CrtContext *ctx, CrtPath *path) {
     crt_add_radiance(path, path->throughput * seen * weight);
 }
 
-/* Emission where the ray meets nothing: the environment and suns. */
-CRT_FN void crt_add_distant_emission(const CrtContext *ctx, CrtPath *path) {
+/* Emission where the ray meets nothing: the environment, at `place`, and suns. */
+CRT_FN void crt_add_distant_emission(const CrtContext *ctx, CrtPath *path, CrtEnvironmentPlace place) {
     CRT_GLOBAL const CrtScene *scene = ctx->scene;
-    if (CRT_HAS(ENVIRONMENT) && scene->environment != CRT_NONE) crt_add_environment(ctx, path);
+    if (CRT_HAS(ENVIRONMENT) && scene->environment != CRT_NONE) crt_add_environment(ctx, path, place);
     if (CRT_HAS(POINT_LIGHT) && scene->point_lights.count != 0u)
         crt_add_radiance(path, path->throughput * crt_suns_seen(ctx, path->ray.d, path->scatter_pdf,
                                                                 path->wavelengths.position));
+}
+
+/* The path's ray meets nothing. Returns 0 when the path has ended: all at once, or, where paths take turns
+   and the environment is an image, at its next turn (crt_has_left). A texel comes from far memory: waiting
+   for it took an eighth of the time in which `sun` of bench/scenes/race is rendered. */
+CRT_FN int crt_leave(const CrtContext *ctx, CrtPath *path) {
+    const CrtEnvironmentPlace place = crt_environment_towards(ctx, path->ray.d);
+    if (CRT_TAKES_TURNS && crt_has_environment_image(ctx)) {
+        crt_fetch_environment(ctx, place);
+        path->place = place;
+        path->leaves = 1;
+        return 1;
+    }
+    crt_add_distant_emission(ctx, path, place);
+    return 0;
+}
+
+/* True for a path that crt_leave kept: it has ended, with the radiance that it sees. */
+CRT_FN int crt_has_left(const CrtContext *ctx, CrtPath *path) {
+    if (!(CRT_TAKES_TURNS && crt_has_environment_image(ctx) && path->leaves)) return 0;
+    crt_add_distant_emission(ctx, path, path->place);
+    return 1;
 }
 
 CRT_KERNEL_END

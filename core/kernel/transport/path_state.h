@@ -20,6 +20,7 @@
 
 #include "kernel/film/film.h"
 #include "kernel/geometry/ray.h"
+#include "kernel/lights/environment_image.h"
 
 CRT_KERNEL_BEGIN
 
@@ -55,6 +56,9 @@ typedef struct CrtPath {
     CRT_PATH_STATE(CRT_PATH_MEMBERS, CRT_PATH_MEMBERS, CRT_PATH_MEMBERS, CRT_PATH_MEMBERS)
     u32 met; /* material that the ray has found a mix to be of (passing.h); or CRT_NONE */
     CRT_GLOBAL vec4 *radiance_row; /* holds the radiance while a wave shades the path; or null */
+    /* Where paths take turns: the ray has met nothing, and the texel of the environment there is fetched. */
+    int leaves;
+    CrtEnvironmentPlace place;
 } CrtPath;
 
 /* Adds radiance that the path has found. A wave adds it to memory: registers are scarcest while it shades,

@@ -37,6 +37,7 @@ CRT_FN void crt_path_begin(const CrtContext *ctx, CrtPath *path, u32 x, u32 y, u
     path->panes = 0u;
     path->hero_only = 0;
     path->met = CRT_NONE;
+    if (CRT_TAKES_TURNS && crt_has_environment_image(ctx)) path->leaves = 0;
     path->media = CRT_HAS(MEDIA) ? scene->camera_media : 0u;
     path->first.albedo = splat4(0.0f);
     path->first.normal = make_vec3(0.0f, 0.0f, 0.0f);
@@ -62,8 +63,7 @@ CRT_FN int crt_shade(const CrtContext *ctx, CrtPath *path, CrtHit hit, CrtShadow
     shadow->pending = 0;
     if (hit.slot == CRT_NONE) {
         if (CRT_HAS(MEDIA)) crt_absorb(ctx, path, 0);
-        crt_add_distant_emission(ctx, path);
-        return 0;
+        return crt_leave(ctx, path);
     }
     const u32 dimension = crt_vertex_dimension(path->depth);
     CrtVertex vertex;
