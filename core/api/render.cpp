@@ -68,6 +68,7 @@ StopReason reasonOf(crt::StopReason reason) {
         case crt::StopReason::Interrupted: return StopReason::Watch;
         case crt::StopReason::Samples:
         case crt::StopReason::Failed: break;  // A failure is thrown.
+        case crt::StopReason::Overtaken: break;  // A render goes on after it.
     }
     return StopReason::Samples;
 }

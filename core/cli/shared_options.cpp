@@ -58,7 +58,9 @@ void addSceneChanges(OptionGroup& group, SceneRequest& scene) {
 Option backendOption(std::string& backend) {
     return {.names = "-b,--backend",
             .placeholder = "NAME",
-            .help = "cuda, embree, opencl, another name, the path of a backend, or auto (CRT_BACKEND)",
+            .help =
+                "cuda, embree, opencl, another name, a path, or auto: the first of these that runs here, "
+                "and in long renders the fastest (CRT_BACKEND)",
             .read = [&backend](const std::string& text) { backend = text; },
             .completion = {Completion::Kind::Backend},
             .environment = "CRT_BACKEND"};

@@ -11,6 +11,7 @@
 #include "render/outputs.h"
 #include "scene/missing_light.h"
 
+#include <algorithm>
 #include <limits>
 #include <new>
 #include <thread>
@@ -66,17 +67,21 @@ void describeRun(FilmIdentity& identity, const RunFacts& facts) {
     identity.record->addRun(run);
 }
 
-/// Waits for them, and says who they are.
-void openDevices(Session& session, RunFacts& facts) {
+void nameBackend(const Session& session, RunFacts& facts) {
     const LoadedBackend& backend = session.backend();
-    const Stage stage("opening the device");
-    const Stopwatch opening;
-    session.openDevice();
-    facts.open_seconds += opening.seconds();
     facts.backend_name = backend.name;
     facts.backend_path = backend.path;
     facts.backend_version = textOrEmpty(backend.table->version);
     facts.backend_build = textOrEmpty(backend.table->build);
+}
+
+/// Waits for them, and says who they are.
+void openDevices(Session& session, RunFacts& facts) {
+    const Stage stage("opening the device");
+    const Stopwatch opening;
+    session.openDevice();
+    facts.open_seconds += opening.seconds();
+    nameBackend(session, facts);
 }
 
 /// True if the film has all requested samples. With nothing but a time to go by, the end of the time is the
@@ -198,6 +203,65 @@ void SceneRenderer::prepare(RunFacts& facts) {
     logInfo("{} on {}", backend, arrayText(facts.backend.device));
 }
 
+bool SceneRenderer::searchesFaster() const {
+    const bool may_choose = options_.backend == "auto" || !options_.search.backends.empty();
+    return may_choose && options_.integrator.device.empty() && !searched_;
+}
+
+/// The devices of a faster backend, which have the scene and a few samples, instead of the present ones.
+void SceneRenderer::takeOver(std::unique_ptr<SceneOnDevices> faster, Rendered& run) {
+    RunFacts& facts = run.facts;
+    describeRun(run.identity, facts);  // Of the samples so far.
+    devices_.reset();
+    session_.emplace(std::move(faster->session));
+    compiled_ = std::move(faster->compiled);
+    devices_.emplace(std::move(faster->film));
+    nameBackend(*session_, facts);
+    askForReport(*session_, facts);
+    facts.driver = driverOf(session_->devices(), facts.devices.front().name);
+    logInfo("{} goes on", facts.backend_name);
+}
+
+/// sampleFilm(), on a faster backend from where one is found.
+SamplingResult SceneRenderer::sample(SamplingPlan plan, Watch& watch, const CheckpointPlan& checkpoints,
+                                     Rendered& run) {
+    const auto checkpoint = [&] {
+        describeRun(run.identity, run.facts);
+        checkpoints.save(run.film, run.identity);
+    };
+    const FasterBackendSearch& search = options_.search;
+    std::unique_ptr<SceneOnDevices> faster;
+    if (searchesFaster())
+        plan.overtaken = [&](const SamplingPace& pace) {
+            if (searched_ || pace.seconds < search.after_seconds ||
+                pace.seconds_left < search.least_seconds_left)
+                return false;
+            searched_ = true;
+            faster = findFasterBackend(scene_, requestedAovs(scene_), options_.integrator, search,
+                                       session_->backend().name, pace, watch);
+            return faster != nullptr;
+        };
+    const SamplingResult before = sampleFilm(*devices_, run.film, plan, watch, checkpoint);
+    if (before.stop != StopReason::Overtaken) return before;
+
+    SampleRanges there = run.film.samples;
+    there.add(faster->samples);
+    std::vector<SampleRange> left;
+    for (const SampleRange& range : plan.ranges)
+        for (const SampleRange& missing : missingSamples(range, there)) left.push_back(missing);
+    plan.ranges = std::move(left);
+    plan.overtaken = {};
+    if (plan.time_limit_seconds > 0)
+        plan.time_limit_seconds = std::max(plan.time_limit_seconds - before.seconds, 1e-3);
+    plan.on_devices = faster->samples;
+    takeOver(std::move(faster), run);
+    SamplingResult result = sampleFilm(*devices_, run.film, plan, watch, checkpoint);
+    result.rendered += before.rendered;
+    result.chunks += before.chunks;
+    result.seconds += before.seconds;
+    return result;
+}
+
 /// CompiledScene → Film, by a backend.
 void SceneRenderer::renderSamples(const SamplingPlan& plan, Watch& watch, const CheckpointPlan& checkpoints,
                                    Rendered& run) {
@@ -219,10 +283,7 @@ void SceneRenderer::renderSamples(const SamplingPlan& plan, Watch& watch, const 
         // To write the film afterwards.
         const MemoryReserve reserve(run.film.shape().bytes() + kWriterBytes);
         const WatchedRendering rendering(watch);
-        result = sampleFilm(*devices_, run.film, sampling, watch, [&] {
-            describeRun(run.identity, facts);
-            checkpoints.save(run.film, run.identity);
-        });
+        result = sample(sampling, watch, checkpoints, run);
     }
     // A device that failed is not asked again; what it said before the first sample stands.
     if (result.stop != StopReason::Failed) askForReport(*session_, facts);

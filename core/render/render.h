@@ -7,6 +7,7 @@
 #include "film/checkpoint.h"
 #include "film/film.h"
 #include "render/device_film.h"
+#include "render/faster_backend.h"
 #include "render/report.h"
 #include "render/sampling.h"
 #include "render/session.h"
@@ -33,6 +34,7 @@ struct RenderOptions {
     std::function<void()> meanwhile{};  ///< Called on a separate thread once the devices are open, for work
                                         ///< that need not wait for the render. Throws nothing.
     std::uint64_t chunk = 0;  ///< Samples per chunk; 0: so many that a chunk takes at most half a second.
+    FasterBackendSearch search{};  ///< Done where no device is named.
 };
 
 /// A target error is decided on and judged by different replicates, so there must be some: gives the scene
@@ -92,6 +94,9 @@ private:
     Rendered rendered(const SamplingPlan& plan, std::optional<EarlierFilm> earlier, Watch& watch,
                       const CheckpointPlan& checkpoints);
     void prepare(RunFacts& facts);
+    bool searchesFaster() const;
+    SamplingResult sample(SamplingPlan plan, Watch& watch, const CheckpointPlan& checkpoints, Rendered& run);
+    void takeOver(std::unique_ptr<SceneOnDevices> faster, Rendered& run);
     void renderSamples(const SamplingPlan& plan, Watch& watch, const CheckpointPlan& checkpoints,
                        Rendered& run);
 
@@ -100,6 +105,7 @@ private:
     std::optional<Session> session_;
     std::shared_ptr<CompiledScene> compiled_;
     BrightestPath brightest_path_;  ///< Of `compiled_`.
+    bool searched_ = false;         ///< For a faster backend.
     std::optional<DeviceFilm> devices_;  ///< Last: of the devices of the one and the scene of the other.
 };
 

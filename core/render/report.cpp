@@ -28,7 +28,8 @@ const char* stopName(StopReason reason) {
         case StopReason::Time: return "time";
         case StopReason::Target: return "target error";
         case StopReason::Interrupted: return "interrupted";
-        case StopReason::Failed: break;
+        case StopReason::Failed:
+        case StopReason::Overtaken: break;
     }
     return "failed";
 }

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <bit>
 #include <chrono>
+#include <cmath>
 #include <mutex>
 #include <new>
 #include <system_error>
@@ -43,6 +44,11 @@ public:
         if (affordable < 1) return 1;
         return std::clamp<std::uint64_t>(static_cast<std::uint64_t>(affordable), 1,
                                          last_count_ * kChunkGrowth);
+    }
+
+    /// Per second, in the last chunk; 0 before there is one.
+    double rate() const {
+        return last_count_ > 0 ? static_cast<double>(last_count_) / std::max(last_seconds_, 1e-9) : 0;
     }
 
     /// `fixed_seconds` of `seconds` would have been the same with any other count.
@@ -213,17 +219,21 @@ SamplingResult sampleFilm(DeviceFilm& devices, Film& film, const SamplingPlan& p
     SamplingResult result;
     ChunkSizer sizer(plan.chunk);
     FilmReader reader(devices, film, plan.paths);
+    if (plan.on_devices.second > plan.on_devices.first) reader.deviceAdvanced(plan.on_devices);
+    result.rendered = plan.on_devices.second - plan.on_devices.first;
 
     ProgressState state;
     const std::uint64_t resumed = film.samples.count();
-    state.samples = state.start_samples = static_cast<double>(resumed);
+    state.start_samples = static_cast<double>(resumed);
+    state.samples = static_cast<double>(resumed + result.rendered);
     state.target = plan.target;
     state.time_limit_seconds = plan.time_limit_seconds;
     state.target_error = plan.target_error;
     state.light_is_missing = plan.light_is_missing;
     state.pixels = film.counts.size();
 
-    std::uint64_t check_at = nextTargetCheck(resumed > 0 ? resumed - 1 : 0, film.counts.size());
+    const std::uint64_t begun = resumed + result.rendered;
+    std::uint64_t check_at = nextTargetCheck(begun > 0 ? begun - 1 : 0, film.counts.size());
     const auto targetReached = [&] {
         if (plan.target_error <= 0 || resumed + result.rendered < check_at) return false;
         check_at = nextTargetCheck(resumed + result.rendered, film.counts.size());
@@ -245,6 +255,18 @@ SamplingResult sampleFilm(DeviceFilm& devices, Film& film, const SamplingPlan& p
         if (const auto reason = reasonToHurry()) return reason;
         if (targetReached()) return StopReason::Target;
         return std::nullopt;
+    };
+    const auto paceBefore = [&](std::uint64_t next, std::uint64_t end) {
+        ProgressState now = state;
+        now.elapsed_seconds = sampling.seconds();
+        double left = now.secondsLeft();
+        if (state.error && state.error->known() && plan.target_error > 0) {
+            // An error falls with the root of the number of samples.
+            const double times = std::pow(state.error->half_width_95 / plan.target_error, 2);
+            const double until_target = now.elapsed_seconds * std::max(0.0, times - 1);
+            left = left < 0 ? until_target : std::min(left, until_target);
+        }
+        return SamplingPace{now.elapsed_seconds, left, sizer.rate(), state.pixels, next, end};
     };
     Patience patience([&] { return reasonToHurry().has_value(); });
 
@@ -288,6 +310,7 @@ SamplingResult sampleFilm(DeviceFilm& devices, Film& film, const SamplingPlan& p
         for (const auto& [first, end] : plan.ranges)
             for (std::uint64_t next = first; next < end;) {
                 if (const auto reason = reasonToStop()) return *reason;
+                if (plan.overtaken && plan.overtaken(paceBefore(next, end))) return StopReason::Overtaken;
                 const double left = plan.time_limit_seconds > 0
                                         ? plan.time_limit_seconds - sampling.seconds()
                                         : kChunkSeconds;

@@ -29,10 +29,21 @@ enum class StopReason {
     Target,       ///< The target error is reached.
     Interrupted,  ///< The Watch asked for it.
     Failed,       ///< The backend failed; the images hold what was rendered before.
+    Overtaken,    ///< Another backend is faster, and is to render the rest.
+};
+
+/// The speed of a render, between two chunks.
+struct SamplingPace {
+    double seconds = 0;                             ///< Of the render so far.
+    double seconds_left = 0;                        ///< Expected; negative while unknown.
+    double samples_per_second = 0;                  ///< Per pixel, of the last chunk.
+    std::uint64_t pixels = 0;                       ///< Of the film.
+    std::uint64_t next_sample = 0, end_sample = 0;  ///< The range that is rendered next.
 };
 
 struct SamplingPlan {
     std::vector<SampleRange> ranges;     ///< To render, in order.
+    SampleRange on_devices{0, 0};        ///< Rendered by the devices, and not yet in the film.
     std::uint64_t target = 0;  ///< Samples per pixel in the film when all ranges are there; 0: endless.
     double time_limit_seconds = 0;       ///< 0: none. Looked at between chunks, as a Watch is.
     PathFacts paths;                     ///< For the error of the film.
@@ -42,6 +53,8 @@ struct SamplingPlan {
     double checkpoint_interval_seconds = 0;  ///< 0: never call `checkpoint`.
     std::function<bool()>
         checkpoint_possible{};  ///< When set and false, a checkpoint that is due waits for the next chunk.
+    std::function<bool(const SamplingPace&)>
+        overtaken{};  ///< When set, asked between chunks; true stops with StopReason::Overtaken.
 };
 
 struct SamplingResult {

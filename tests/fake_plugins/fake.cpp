@@ -16,6 +16,7 @@
 // CRT_FAKE_SCENE_SECONDS: so long takes set_scene, which says how far it is.
 // CRT_FAKE_FIRST_START_MS: so long takes the first integrator of a process, as a driver does that is not
 // loaded yet.
+// CRT_FAKE_SAMPLE_MS, in CMakeLists.txt: so long takes a sample of all pixels, at least.
 #include "backend/sdk/plugin_guard.h"
 
 #include "fake_pattern.h"
@@ -27,6 +28,10 @@
 #include <cstring>
 #include <limits>
 #include <thread>
+
+#ifndef CRT_FAKE_SAMPLE_MS
+#define CRT_FAKE_SAMPLE_MS 0
+#endif
 
 namespace {
 
@@ -89,6 +94,8 @@ public:
                 throw PluginError(CRT_OUT_OF_MEMORY, "the device has no memory left for 12 more rows");
             if (half_way && fault == "device")
                 throw PluginError(CRT_DEVICE_FAILED, "the device fell off the bus");
+            const auto samples = std::chrono::milliseconds(CRT_FAKE_SAMPLE_MS) * range.sample_count;
+            std::this_thread::sleep_for(samples / (range.y1 - range.y0));
             if (fault == "slow") std::this_thread::sleep_for(std::chrono::milliseconds(2));
             if (fault == "endless" && half_way && range.first_sample + range.sample_count > 4) {
                 while (!host_.cancelled(done)) std::this_thread::sleep_for(std::chrono::milliseconds(10));
