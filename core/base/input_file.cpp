@@ -82,6 +82,12 @@ int openInput(const std::string& path) {
 
 void requireInput(const std::string& path) { const Descriptor file(openInput(path)); }
 
+std::string plainPath(const std::filesystem::path& path) {
+    const std::filesystem::path plain = path.lexically_normal();
+    std::error_code unknown;
+    return std::filesystem::equivalent(plain, path, unknown) ? plain.string() : path.string();
+}
+
 std::string readInput(const std::string& path, std::uint64_t most_bytes) {
     const Descriptor file(openInput(path));
     struct stat status {};

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <stdexcept>
 #include <string>
 
@@ -32,6 +33,10 @@ int openInput(const std::string& path);
 /// The same for libraries that open the file themselves: throws InputRefused unless `path` is a regular file
 /// that can be read.
 void requireInput(const std::string& path);
+
+/// The path without "." and "..", where that still names the same file: behind a symbolic link ".." is
+/// another folder.
+std::string plainPath(const std::filesystem::path& path);
 
 /// The content of a regular file of at most `most_bytes`. Throws InputRefused.
 std::string readInput(const std::string& path, std::uint64_t most_bytes);

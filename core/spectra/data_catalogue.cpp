@@ -120,7 +120,7 @@ std::string fileOf(const std::string& family, const std::string& name) {
     std::error_code unknown;
     for (const std::string& folder : dataDirectories()) {
         const fs::path path = fs::path(folder) / family / (name + std::string(kExtension));
-        if (fs::exists(path, unknown)) return path.lexically_normal().string();
+        if (fs::exists(path, unknown)) return plainPath(path);
     }
     return {};
 }

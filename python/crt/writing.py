@@ -60,7 +60,8 @@ def yaml(content, remarks=()):
 def relative(value, folder):
     """A copy of `value` with paths as texts: relative to `folder`."""
     if isinstance(value, pathlib.Path):
-        return os.path.relpath(value, folder)
+        # Of real paths: ".." behind a symbolic link leads elsewhere.
+        return os.path.relpath(os.path.realpath(value), os.path.realpath(folder))
     if isinstance(value, dict):
         return {key: relative(inner, folder) for key, inner in value.items()}
     if isinstance(value, (list, tuple)):

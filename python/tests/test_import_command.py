@@ -44,6 +44,21 @@ def test_a_scene_with_its_meshes_is_written_beside_it(tmp_path):
     assert np.array_equal(rendered(loaded), rendered(crt.import_scene(source).scene))
 
 
+def test_paths_hold_where_a_folder_is_a_symbolic_link(tmp_path):
+    written(tmp_path, "in/triangle.ply", "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\n"
+            "property float y\nproperty float z\nelement face 1\n"
+            "property list uchar int vertex_indices\nend_header\n0 0 0\n40 0 0\n20 40 0\n3 0 1 2\n")
+    mesh = 'Shape "plymesh" "string filename" "triangle.ply"'
+    scene = SCENE.replace('Shape "sphere" "float radius" 5', mesh)
+    source = written(tmp_path, "in/s.pbrt", scene)
+    (tmp_path / "far/away").mkdir(parents=True)
+    (tmp_path / "link").symlink_to("far/away")
+    done = run(source, "-o", "link/made.yaml", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    loaded = crt.load(tmp_path / "link/made.yaml")
+    assert np.array_equal(rendered(loaded), rendered(crt.import_scene(source).scene))
+
+
 def test_nothing_is_overwritten_unless_asked(tmp_path):
     source = written(tmp_path, "s.pbrt", SCENE)
     made = written(tmp_path, "made.yaml", "mine")

@@ -1,5 +1,6 @@
 #include "scene/yaml/composed_text.h"
 
+#include "base/input_file.h"
 #include "base/words.h"
 
 #include <fmt/format.h>
@@ -42,7 +43,7 @@ public:
 private:
     std::string scalar(const YamlNode& node, const YamlPlace& place) const {
         if (const std::string* path = files_.pathAt(place))
-            return quoted(std::filesystem::absolute(*path).lexically_normal().string());
+            return quoted(plainPath(std::filesystem::absolute(*path)));
         if (node.quoted) return quoted(node.text);
         if (node.text == "true" || node.text == "false") return node.text;
         return looksLikeNumber(node.text) ? numberText(node.text) : quoted(node.text);

@@ -1,6 +1,7 @@
 // Over 450 lines: one class, with a short function for each kind of value that a key can have.
 #include "scene/yaml/scene_reader.h"
 
+#include "base/input_file.h"
 #include "base/log.h"
 #include "base/modules.h"
 #include "scene/yaml/scene_hints.h"
@@ -426,7 +427,7 @@ std::optional<std::string> locateIn(const std::vector<fs::path>& directories, co
             out.error(place, fmt::format("'{}' is a directory", path.string()));
             return std::nullopt;
         }
-        if (fs::exists(path, ec)) return path.lexically_normal().string();
+        if (fs::exists(path, ec)) return plainPath(path);
     }
     if (wanted.is_absolute()) {
         out.error(place, fmt::format("there is no file '{}'", wanted.string()));
