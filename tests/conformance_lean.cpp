@@ -167,6 +167,29 @@ TEST_CASE("a kernel with everything in it gives the bits of the lean one", "[bit
         WARN("the backend has one kernel for all scenes, so there was nothing to compare it with");
 }
 
+// Holes are looked for where a surface has one, not where surfaces have two sides. Another search finds the
+// shadow rays that end on a round lamp.
+TEST_CASE("a scene of two-sided surfaces without holes has the same bits in both kernels", "[bits][lean]") {
+    const Scene scene = sceneFrom(R"(crt: 1
+camera: {position: [0, 1, -4], target: [0, 0.5, 0], fov: 40}
+film: {resolution: [24, 24]}
+materials:
+  white: {type: diffuse, reflectance: 0.7}
+  black: {type: diffuse, reflectance: 0}
+  sheet: {type: two_sided, front: white, back: black}
+objects:
+  - name: floor
+    mesh: {positions: [[-200,0,-200],[-200,0,200],[200,0,200],[200,0,-200]], faces: [[0,1,2,3]]}
+    material: sheet
+  - name: lamp
+    sphere: {radius: 0.1}
+    material: black
+    transform: [{translate: [0, 17, 0]}]
+    emission: {radiance: 16000}
+)");
+    compareLean(scene, 0, 64);
+}
+
 TEST_CASE("lean kernels of random scenes give the bits of the full one", "[random][lean]") {
     const std::vector<Named> scenes = allScenes();
     std::mt19937_64 random(47);

@@ -1,16 +1,22 @@
-// Lean kernels of the Embree backend: the compiler that is looked for, the text and the options, the cache
-// key, and what happens where a compiler is broken.
+// Kernels of the Embree backend: which of those that are compiled ahead a scene gets. Lean ones: the
+// compiler that is looked for, the text and the options, the cache key, and what happens where a compiler is
+// broken.
 #ifdef CRT_HAVE_EMBREE_PROGRAM  // nothing to test in a build without Embree
 
 #include "catch.h"
-#include "embree_lean_kernel.h"
+#include "embree_program.h"
 #include "file_bytes.h"
 
 #include "base/temporary_folder.h"
+#include "compile/compile.h"
+#include "kernel/dialect/features.h"
+#include "scene/yaml/scene_yaml.h"
 
 #include <sys/stat.h>
 
 #include <algorithm>
+#include <bit>
+#include <filesystem>
 #include <set>
 #include <stdexcept>
 
@@ -95,6 +101,23 @@ TEST_CASE("the text of a lean kernel is one file", "[embree_program]") {
     CHECK(traversal < entry);
     REQUIRE(entry != std::string::npos);
     CHECK(text.find("struct TileJob", job + 1) == std::string::npos);
+}
+
+TEST_CASE("no kernel that is compiled ahead is smaller than the chosen one", "[embree_program]") {
+    CHECK(allPrecompiled().back().features == CRT_FEATURES_ALL);
+    for (const auto& file : std::filesystem::directory_iterator(CRT_SOURCE_DIR "/configs")) {
+        if (file.path().extension() != ".yaml") continue;
+        const std::uint64_t needed = crt::compileScene(crt::loadScene(file.path()), 0).header().features;
+        const Precompiled& chosen = choosePrecompiled(needed, CRT_KERNEL_LEAN);
+        INFO(file.path().filename() << ": " << chosen.name);
+        CHECK((needed & ~chosen.features) == 0);
+        for (const Precompiled& other : allPrecompiled())
+            if ((needed & ~other.features) == 0)
+                CHECK(std::popcount(other.features) >= std::popcount(chosen.features));
+        // It is the only scene with instances.
+        if (file.path().stem() != "forest") CHECK(chosen.features != CRT_FEATURES_ALL);
+        CHECK(choosePrecompiled(needed, CRT_KERNEL_FULL).features == CRT_FEATURES_ALL);
+    }
 }
 
 TEST_CASE("a compiler that refuses, crashes or says nothing is quoted", "[embree_program]") {

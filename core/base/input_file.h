@@ -34,8 +34,8 @@ int openInput(const std::string& path);
 /// that can be read.
 void requireInput(const std::string& path);
 
-/// The path without "." and "..", where that still names the same file: behind a symbolic link ".." is
-/// another folder.
+/// The path without "." and "..", where that still names the same file: behind a symbolic link ".." leads
+/// elsewhere.
 std::string plainPath(const std::filesystem::path& path);
 
 /// The content of a regular file of at most `most_bytes`. Throws InputRefused.

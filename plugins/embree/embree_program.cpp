@@ -3,10 +3,10 @@
 #include "embree_kernels.h"
 
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <cstdlib>
 #include <exception>
+#include <iterator>
 #include <limits>
 #include <stdexcept>
 #include <thread>
@@ -15,24 +15,15 @@ namespace crt::embree {
 
 using plugin::KernelCache;
 
-// One per row below; kernels.cpp defines them.
-RayTotals renderBox(const TileJob& job);
-RayTotals renderMesh(const TileJob& job);
-RayTotals renderSmooth(const TileJob& job);
-RayTotals renderGlossy(const TileJob& job);
-RayTotals renderAll(const TileJob& job);
+#define CRT_EMBREE_DECLARE(Name, NAME, lean, text) RayTotals render##Name(const TileJob& job);
+CRT_EMBREE_KERNELS(CRT_EMBREE_DECLARE)  // kernels.cpp defines them.
+#undef CRT_EMBREE_DECLARE
 
 namespace {
 
-// kernels.cpp is compiled with the same masks. Smallest first.
-constexpr std::array<Precompiled, 5> kPrograms{{
-    {"box: a handful of diffuse triangles", CRT_EMBREE_BOX_FEATURES, renderBox, true},
-    {"mesh: diffuse meshes", CRT_EMBREE_MESH_FEATURES, renderMesh, true},
-    {"smooth: mirrors, metals and glass", CRT_EMBREE_SMOOTH_FEATURES, renderSmooth, true},
-    {"glossy: metals, glass, panes and plastic of any roughness", CRT_EMBREE_GLOSSY_FEATURES, renderGlossy,
-     false},
-    {"all features", CRT_EMBREE_ALL_FEATURES, renderAll, false},
-}};
+#define CRT_EMBREE_ROW(Name, NAME, lean, text) {text, CRT_EMBREE_##NAME##_FEATURES, render##Name, lean},
+constexpr Precompiled kPrograms[] = {CRT_EMBREE_KERNELS(CRT_EMBREE_ROW)};
+#undef CRT_EMBREE_ROW
 
 using Clock = std::chrono::steady_clock;
 
@@ -53,8 +44,10 @@ const Precompiled& choosePrecompiled(std::uint64_t scene_features, CrtKernelChoi
     if (choice != CRT_KERNEL_FULL)
         for (const Precompiled& program : kPrograms)
             if ((scene_features & ~program.features) == 0) return program;
-    return kPrograms.back();
+    return std::end(kPrograms)[-1];
 }
+
+std::span<const Precompiled> allPrecompiled() { return kPrograms; }
 
 EmbreeProgram::EmbreeProgram(const plugin::Host& host, std::uint64_t scene_features, CrtKernelChoice choice)
     : host_(host),

@@ -13,6 +13,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 
 namespace crt::embree {
@@ -24,6 +25,9 @@ struct Precompiled {
     RenderTile render;
     bool is_lean_enough;  ///< A kernel of the scene's features alone is no faster, by measurement.
 };
+
+/// Smallest mask first; the last one has all features.
+std::span<const Precompiled> allPrecompiled();
 
 /// The smallest one that covers the scene.
 const Precompiled& choosePrecompiled(std::uint64_t scene_features, CrtKernelChoice choice);

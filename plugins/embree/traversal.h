@@ -11,6 +11,9 @@ namespace crt::embree {
 
 using namespace kernel;
 
+// Each kernel's own: they hold what its mask has. The linker would keep those of one kernel for all.
+namespace {
+
 inline vec8 cullMax(vec8 a, vec8 b) { return (vec8)_mm256_max_ps((__m256)a, (__m256)b); }
 
 /// Bits of the children that the ray enters at most `limit` away, and where: crt_node_distances.
@@ -181,4 +184,5 @@ inline bool anyHit(const CrtContext* ctx, const CrtRay& ray, CrtPassable* passab
     return false;
 }
 
+}  // namespace
 }  // namespace crt::embree

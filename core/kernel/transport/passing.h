@@ -20,7 +20,7 @@ CRT_KERNEL_BEGIN
 
 /* True if the scene has surfaces that rays may pass. */
 CRT_FN int crt_is_passable(const CrtContext *ctx) {
-    return (CRT_HAS(OPACITY) && ctx->scene->compositions.count != 0u) || crt_has_panes(ctx);
+    return CRT_SCENE_HAS(ctx->scene, OPACITY) || crt_has_panes(ctx);
 }
 
 /* State of a ray while it passes surfaces. */
