@@ -13,6 +13,7 @@
 #include <atomic>
 #include <bit>
 #include <cmath>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -220,7 +221,7 @@ void Pairs::hitBy(const Asked& asked, std::uint32_t slot, std::vector<Hit>& hits
 
 /// Of several hits of a ray the nearest counts, and of equally near ones the lower id.
 bool Pairs::anyNear(const std::vector<std::vector<Hit>>& parts) const {
-    std::vector<kernel::CrtHit> best(rays_.size(), kernel::crt_no_hit(CRT_INFINITY));
+    std::vector<kernel::CrtHit> best(rays_.size(), kernel::crt_no_hit(std::numeric_limits<float>::infinity()));
     for (const std::vector<Hit>& part : parts)
         for (const auto& [ray, hit] : part)
             if (hit.t < best[ray].t || (hit.t == best[ray].t && hit.id < best[ray].id)) best[ray] = hit;
