@@ -1,20 +1,19 @@
 #include "render/faster_backend.h"
 
 #include "backend/loader.h"
-#include "base/error.h"
 #include "base/log.h"
 #include "base/stage.h"
 #include "base/stopwatch.h"
 
 #include <algorithm>
-#include <new>
+#include <exception>
 #include <utility>
 
 namespace crt {
 namespace {
 
 constexpr double kChunkSeconds = 0.2;  ///< A rate is that of a chunk which takes at least so long.
-constexpr double kMostSeconds = 5;     ///< Of a backend's samples: one that needs longer is slower.
+constexpr double kMostSeconds = 5;     ///< The present backend takes 2 s for what is rendered in them.
 constexpr double kFaster = 1.05;       ///< Rates of one backend differ by about as much.
 
 /// Thrown through samples that are not waited for.
@@ -51,10 +50,8 @@ std::unique_ptr<SceneOnDevices> openOther(const std::string& name, const Scene& 
         auto other = std::make_unique<SceneOnDevices>(loadBackend(name), options, scene, aovs);
         other->film.setScene();
         return other;
-    } catch (const Error& error) {
+    } catch (const std::exception& error) {
         logDebug("{} is not tried: {}", name, error.what());
-    } catch (const std::bad_alloc&) {
-        logDebug("{} is not tried: out of memory on the host", name);
     }
     return nullptr;
 }
@@ -83,13 +80,15 @@ std::unique_ptr<SceneOnDevices> findFasterBackend(const Scene& scene, std::uint3
         double rate = 0;
         try {
             rate = samplesPerSecond(*other, pace, watch);
+            logInfo("{} renders {:.3g} million paths per second, {} {:.3g}", other->session.backend().name,
+                    rate * pixels, present, pace.samples_per_second * pixels);
         } catch (const TrialEnds&) {
-            logDebug("{} had not finished its samples after {:.1f} s", name, kMostSeconds);
-        } catch (const Error& error) {
+            if (!watch.stopRequested())
+                logInfo("{} is slower than {}: two samples take more than {:.0f} s", name, present,
+                        kMostSeconds);
+        } catch (const std::exception& error) {
             logDebug("{} is not taken: {}", name, error.what());
         }
-        logInfo("{} renders {:.3g} million paths per second, {} {:.3g}", other->session.backend().name,
-                rate * pixels, present, pace.samples_per_second * pixels);
         if (rate <= best_rate) continue;
         best_rate = rate;
         best = std::move(other);

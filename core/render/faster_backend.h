@@ -21,6 +21,7 @@ namespace crt {
 struct FasterBackendSearch {
     double after_seconds = 10;   ///< Of the render. By then the Embree backend has its lean kernel.
     double least_seconds_left = 120;
+    double least_samples_per_second = 1;  ///< Of a pixel. Larger images are not rendered twice to try.
     std::vector<std::string> backends{};  ///< Names or paths; empty: knownBackends(), for `auto` alone.
 };
 

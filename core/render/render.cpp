@@ -234,7 +234,8 @@ SamplingResult SceneRenderer::sample(SamplingPlan plan, Watch& watch, const Chec
     if (searchesFaster())
         plan.overtaken = [&](const SamplingPace& pace) {
             if (searched_ || pace.seconds < search.after_seconds ||
-                pace.seconds_left < search.least_seconds_left)
+                pace.seconds_left < search.least_seconds_left ||
+                pace.samples_per_second < search.least_samples_per_second)
                 return false;
             searched_ = true;
             faster = findFasterBackend(scene_, requestedAovs(scene_), options_.integrator, search,
