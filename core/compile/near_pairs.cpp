@@ -221,7 +221,8 @@ void Pairs::hitBy(const Asked& asked, std::uint32_t slot, std::vector<Hit>& hits
 
 /// Of several hits of a ray the nearest counts, and of equally near ones the lower id.
 bool Pairs::anyNear(const std::vector<std::vector<Hit>>& parts) const {
-    std::vector<kernel::CrtHit> best(rays_.size(), kernel::crt_no_hit(std::numeric_limits<float>::infinity()));
+    constexpr float kAnywhere = std::numeric_limits<float>::infinity();
+    std::vector<kernel::CrtHit> best(rays_.size(), kernel::crt_no_hit(kAnywhere));
     for (const std::vector<Hit>& part : parts)
         for (const auto& [ray, hit] : part)
             if (hit.t < best[ray].t || (hit.t == best[ray].t && hit.id < best[ray].id)) best[ray] = hit;

@@ -4,19 +4,15 @@
 
 /// Calls K(Name, NAME, lean, "what it is for") for each, smallest mask first; of equal ones the faster one.
 /// `lean`: a kernel of the scene's features alone is no faster. Decision 0088 has the measurement that chose
-/// the masks: fewer kernels cost a scene time, more kernels cost every build seconds.
-#define CRT_EMBREE_KERNELS(K)                                                                              \
-    K(Box, BOX, true, "box: a handful of diffuse triangles")                                               \
-    K(Mesh, MESH, true, "mesh: diffuse meshes")                                                            \
-    K(Smooth, SMOOTH, true, "smooth: mirrors, metals and glass")                                           \
-    K(Opaque, OPAQUE, false, "opaque: metals and plastic of any roughness, spectral films")                \
-    K(Daylight, DAYLIGHT, false, "daylight: metals, plastic and clear glass under lamps and skies")        \
-    K(Frosted, FROSTED, false, "frosted: daylight, rough glass and panes")                                 \
-    K(Textured, TEXTURED, false, "textured: daylight, textures, mixes and shapes")                         \
-    K(Mapped, MAPPED, false, "mapped: daylight, textures, mixes and normal maps")                          \
-    K(Glossy, GLOSSY, false, "glossy: metals, glass, panes and plastic of any roughness")                  \
-    K(Coated, COATED, false, "coated: metals, plastic and clear glass under coats and fuzz, and textures") \
-    K(Cutout, CUTOUT, false, "cutout: textured, holes, rough glass and panes")                             \
+/// the masks: fewer kernels cost scenes time, more cost every build seconds and every installation space.
+#define CRT_EMBREE_KERNELS(K)                                                                       \
+    K(Box, BOX, true, "box: a handful of diffuse triangles")                                        \
+    K(Mesh, MESH, true, "mesh: diffuse meshes")                                                     \
+    K(Smooth, SMOOTH, true, "smooth: mirrors, metals and glass")                                    \
+    K(Opaque, OPAQUE, false, "opaque: metals and plastic of any roughness, spectral films")         \
+    K(Daylight, DAYLIGHT, false, "daylight: metals, plastic and clear glass under lamps and skies") \
+    K(Glossy, GLOSSY, false, "glossy: metals, glass, panes and plastic of any roughness")           \
+    K(Textured, TEXTURED, false, "textured: daylight, textures, normal maps and mixes")             \
     K(All, ALL, false, "all features")
 
 #define CRT_EMBREE_LIT_FEATURES                                                                 \
@@ -44,29 +40,13 @@
     ((unsigned long)(CRT_EMBREE_SMOOTH_FEATURES | CRT_FEATURE_ROUGH_CONDUCTOR | CRT_FEATURE_PLASTIC | \
                      CRT_FEATURE_POINT_LIGHT | CRT_FEATURE_ENVIRONMENT_LIGHT |                        \
                      CRT_FEATURE_ENVIRONMENT_IMAGE))
-#define CRT_EMBREE_FROSTED_FEATURES                                                \
-    ((unsigned long)(CRT_EMBREE_DAYLIGHT_FEATURES | CRT_FEATURE_ROUGH_DIELECTRIC | \
-                     CRT_FEATURE_THIN_DIELECTRIC))
 #define CRT_EMBREE_TEXTURED_FEATURES                                                        \
     ((unsigned long)(CRT_EMBREE_DAYLIGHT_FEATURES | CRT_FEATURE_TEXTURE | CRT_FEATURE_MIX | \
-                     CRT_FEATURE_SHAPES))
-#define CRT_EMBREE_MAPPED_FEATURES                                                          \
-    ((unsigned long)(CRT_EMBREE_DAYLIGHT_FEATURES | CRT_FEATURE_TEXTURE | CRT_FEATURE_MIX | \
-                     CRT_FEATURE_NORMAL_MAP))
-/// Untextured, under lights with a surface.
+                     CRT_FEATURE_SHAPES | CRT_FEATURE_NORMAL_MAP))
 #define CRT_EMBREE_GLOSSY_FEATURES                                                                      \
     ((unsigned long)(CRT_EMBREE_SMOOTH_FEATURES | CRT_FEATURE_ROUGH_CONDUCTOR |                         \
                      CRT_FEATURE_ROUGH_DIELECTRIC | CRT_FEATURE_THIN_DIELECTRIC | CRT_FEATURE_PLASTIC | \
                      CRT_FEATURE_MEDIA | CRT_FEATURE_THIN_FILM | CRT_FEATURE_MIX | CRT_FEATURE_ANISOTROPY))
-/// Under lights with a surface, many of them too.
-#define CRT_EMBREE_COATED_FEATURES                                                                        \
-    ((unsigned long)(CRT_EMBREE_SMOOTH_FEATURES | CRT_FEATURE_ROUGH_CONDUCTOR | CRT_FEATURE_PLASTIC |     \
-                     CRT_FEATURE_ROUGH_BASE | CRT_FEATURE_FUZZ | CRT_FEATURE_CLEARCOAT |                  \
-                     CRT_FEATURE_TEXTURE | CRT_FEATURE_NORMAL_MAP | CRT_FEATURE_MIX | CRT_FEATURE_MEDIA | \
-                     CRT_FEATURE_LIGHT_TREE))
-#define CRT_EMBREE_CUTOUT_FEATURES                                                                      \
-    ((unsigned long)(CRT_EMBREE_TEXTURED_FEATURES | CRT_EMBREE_FROSTED_FEATURES | CRT_FEATURE_OPACITY | \
-                     CRT_FEATURE_ROUGH_BASE))
 #define CRT_EMBREE_ALL_FEATURES CRT_FEATURES_ALL
 
 // Behind the masks: CRT_FEATURES, which it evaluates, is one of them.
