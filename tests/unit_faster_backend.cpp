@@ -26,7 +26,7 @@ struct Search {
 Search searched(const std::string& first, const std::vector<std::string>& others, std::uint64_t samples) {
     const Scene scene =
         parseScene("crt: 1\nfilm: {resolution: [6, 4]}\nenvironment: {radiance: 1}\n", "test", ".");
-    RenderOptions options{.backend = plugin(first), .spp = samples, .chunk = 4};
+    RenderOptions options{.backend = plugin(first), .spp = samples, .chunk = 64};
     for (const std::string& name : others) options.search.backends.push_back(plugin(name));
     options.search.after_seconds = 0.02;
     options.search.least_seconds_left = 0.02;
