@@ -178,6 +178,25 @@ TEST_CASE("the first signal is remembered, and the handlers go with the guard") 
     CHECK(after.sa_handler == before.sa_handler);
 }
 
+TEST_CASE("the limit on processor time is exceeded again and again, also while the process ends") {
+    struct sigaction before {};
+    sigaction(SIGXCPU, nullptr, &before);
+    { const InterruptGuard guard; }
+    struct sigaction unsent {};
+    sigaction(SIGXCPU, nullptr, &unsent);
+    CHECK(unsent.sa_handler == before.sa_handler);
+    {
+        const InterruptGuard guard;
+        std::raise(SIGXCPU);
+        std::raise(SIGXCPU);
+        CHECK(InterruptGuard::signalReceived() == SIGXCPU);
+    }
+    struct sigaction ignored {};
+    sigaction(SIGXCPU, nullptr, &ignored);
+    CHECK(ignored.sa_handler == SIG_IGN);
+    sigaction(SIGXCPU, &before, nullptr);
+}
+
 namespace {
 
 /// The fake backend with a small scene.

@@ -1813,10 +1813,6 @@ def run(case_, number):
     code = process.returncode
 
     wrong = []
-    # A sanitizer looks for leaks after crt has let go of signals: those that come only then end it, and
-    # nothing is lost.
-    if SLOWER > 1 and -code in case_.how.get("send", ()) and "stopped by" in text:
-        code = 128 - code
     if hung:
         wrong.append(f"still running after {WAIT_SECONDS * SLOWER:g} s")
     elif code < 0:

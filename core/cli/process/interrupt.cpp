@@ -69,6 +69,8 @@ InterruptGuard::InterruptGuard() {
 
 InterruptGuard::~InterruptGuard() {
     for (const Saved& s : saved_) sigaction(s.signal, &s.action, nullptr);
+    // The system sends the next SIGXCPU a second after the first, perhaps while the process ends.
+    if (g_signal == SIGXCPU) std::signal(SIGXCPU, SIG_IGN);
 }
 
 void ignoreWriteSignals() {

@@ -11,7 +11,8 @@ namespace crt {
 /// Catches SIGINT, SIGTERM, SIGHUP and SIGXCPU (the soft limit on processor time: the hard one, which
 /// follows, kills) for as long as it lives; one at a time. Outside it the signals end the process as usual,
 /// which is right while there is nothing to save. A signal that the parent had set to be ignored (nohup, a
-/// background job of a shell script) stays ignored.
+/// background job of a shell script) stays ignored. SIGXCPU is ignored from the end of a guard that has
+/// received it: the system repeats it every second, and a process that ends must keep its exit code.
 class InterruptGuard {
 public:
     InterruptGuard();
