@@ -19,6 +19,8 @@
 namespace crt {
 namespace {
 
+using kernel::u64;  // CRT_ARRAY computes with it
+
 /// Triangles that are asked at most, in large scenes an even choice of them.
 constexpr std::uint64_t kTriangles = 10000;
 constexpr std::uint64_t kEmitters = 100000;
