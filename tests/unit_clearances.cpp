@@ -119,7 +119,7 @@ Walk walkIn(const crt::CompiledScene& compiled, std::uint64_t vertices, Random& 
         const u32 left = hit.id;
         hit = crt_brute_force_closest(
             &ctx, rayOf(crt_offset_origin(surface.p, clearance, surface.ng, scatter.wi), scatter.wi));
-        walk.self_hits += hit.id == left;
+        walk.self_hits += hit.slot != CRT_NONE && hit.id == left;
         if (!(object_of(hit) < 6)) {
             ++walk.escapes;
             hit.slot = CRT_NONE;

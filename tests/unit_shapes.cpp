@@ -226,7 +226,7 @@ TEST_CASE("a ray that leaves a sphere or a cylinder outwards never meets it agai
                 const vec3 d = leaving(surface.ng, random);
                 if (!(dot3(d, surface.ng) > 0)) continue;
                 const vec3 o = crt_offset_origin(surface.p, surface.clearance, surface.ng, d);
-                met += crt_brute_force_closest(&ctx, rayOf(o, d)).id == slot;
+                met += crt_brute_force_closest(&ctx, rayOf(o, d)).slot == slot;
             }
             INFO("scale " << place.scale << ", far " << place.far << (round ? ", sphere" : ", cylinder"));
             CHECK(met == 0);

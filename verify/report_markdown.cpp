@@ -16,7 +16,7 @@ namespace {
 constexpr const char* kPreamble = R"(# Stability: the cases of crt verify
 
 <!-- Generated from the registry in verify/. Change it there, then run
-     crt verify --markdown --figures cuda/verify.json --figures embree/verify.json > docs/stability.md -->
+     crt verify --markdown --figures embree/verify.json --figures opencl/verify.json > docs/stability.md -->
 
 `crt verify` renders scenes with known answers and reports whether the backend finds them. It takes any
 backend, including those that are not part of crt:

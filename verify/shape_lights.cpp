@@ -51,6 +51,57 @@ double cylinderFactor(double radius, double half, double height) {
            kPi;
 }
 
+/// A floor and a ceiling two lengths from each other, and a lamp half-way, small against the distance: its
+/// coordinates and its size are exact to less than what rounding makes of a ray that goes so far. `more`: a
+/// further object, which no light meets.
+std::string halfWay(const std::string& lamp, const std::string& more) {
+    return fmt::format(
+        "crt: 1\ncamera: {{position: [0, -0.999, -1e-3], target: [0, -1, 0], fov: 0.01}}\n"
+        "film: {{resolution: [4, 4]}}\nintegrator: {}\n"
+        "materials:\n  white: {{type: diffuse, reflectance: 1}}\n"
+        "  black: {{type: diffuse, reflectance: 0}}\n"
+        "  lace: {{type: diffuse, reflectance: 0, opacity: 0.5}}\n"
+        "  pane: {{type: thin_dielectric, ior: 1.5}}\n"
+        "objects:\n"
+        "  - {{material: white, mesh: {{positions: [[-1, -1, -1], [-1, -1, 1], [1, -1, 1], [1, -1, -1]], "
+        "faces: [[0, 1, 2, 3]]}}}}\n"
+        "  - {{material: black, mesh: {{positions: [[-1, 1, -1], [1, 1, -1], [1, 1, 1], [-1, 1, 1]], "
+        "faces: [[0, 1, 2, 3]]}}}}\n{}{}",
+        kDirect, more, lamp);
+}
+
+/// Lamps that are small and far, of all kinds, where shadow rays meet only what stops them, and where they
+/// may pass something.
+void smallLamps(Context& context) {
+    const double size = 1e-3;
+    const char* const elsewhere[] = {
+        "", "  - {material: lace, sphere: {radius: 0.01}, transform: [{translate: [0.9, 0.9, 0.9]}]}\n",
+        "  - {material: pane, sphere: {radius: 0.01}, transform: [{translate: [0.9, 0.9, 0.9]}]}\n"};
+    const auto mesh = [](const char* corners, const char* face) {
+        return fmt::format("mesh: {{positions: [{}], faces: [{}]}}", corners, face);
+    };
+    const std::string scaled = fmt::format("{{scale: {}}}", size);
+    const std::string upright = "{rotate: {axis: [1, 0, 0], angle_deg: 90}}, " + scaled;
+    const std::tuple<const char*, std::string, double> lamps[] = {
+        {"a square", lamp(mesh("[-1,0,-1],[1,0,-1],[1,0,1],[-1,0,1]", "[0,1,2,3]"), scaled),
+         squareFormFactor(0, size)},
+        {"a triangle", lamp(mesh("[-1,0,-1],[2,0,-1],[-1,0,2]", "[0,1,2]"), scaled),
+         4.5 * size * size / kPi},
+        {"a sphere", lamp("sphere: {radius: 1}", scaled), size * size},
+        {"a disk", lamp("disk: {radius: 1}", upright), size * size / (size * size + 1)},
+        {"a cylinder",
+         lamp("cylinder: {radius: 0.5, from_z: -1, to_z: 1}",
+              "{rotate: {axis: [0, 1, 0], angle_deg: 90}}, " + scaled),
+         cylinderFactor(size / 2, size, 1)}};
+    for (const auto& [what, lamp, factor] : lamps)
+        for (const auto& [more, where] : {std::pair{elsewhere[0], ""},
+                                          {elsewhere[1], ", in a scene with holes"},
+                                          {elsewhere[2], ", in a scene with panes"}})
+            context.estimate(fmt::format("{} a thousandth as large as its distance{}", what, where),
+                             halfWay(lamp, more), meanRadiance, factor, 1e-3,
+                             {.samples = 256, .most = 1024});
+}
+
 /// A camera inside a hollow shape of reflectance 0.5 that shines with radiance 1, at depth 1.
 std::string insideLamp(const std::string& shape, const std::string& transform, const std::string& view,
                        const std::string& integrator, const char* two_sided) {
@@ -171,7 +222,14 @@ std::vector<Case> shapeLightCases() {
             "1 + s/2 of a share s of a sphere", "integrating sphere: all places see each other alike",
             "± 0.2 %", Level::Commit,
             CRT_FEATURE_SHAPES | CRT_FEATURE_AREA_LIGHT | CRT_FEATURE_NEE | CRT_FEATURE_DIFFUSE,
-            lampsThatLightThemselves)};
+            lampsThatLightThemselves),
+        row("G44", "small-lamps",
+            "A floor under squares, triangles, spheres, disks and cylinders a thousandth as large as their "
+            "distance, in the middle of the scene, alone and beside holes and panes",
+            "A/(π h²), R²/h², quadrature", "form factors (Howell)", "± 0.1 %", Level::Commit,
+            CRT_FEATURE_SHAPES | CRT_FEATURE_AREA_LIGHT | CRT_FEATURE_NEE | CRT_FEATURE_DIFFUSE |
+                CRT_FEATURE_OPACITY | CRT_FEATURE_THIN_DIELECTRIC,
+            smallLamps)};
 }
 
 }  // namespace crt::verify

@@ -18,10 +18,11 @@
  *   9   roulette counts the panes that a path has passed
  *   10  a table has the mean reflectance of a film on a rough metal
  *   11  Sobol points of two dimensions are stratified together
+ *   12  rounding does not make a small light block the rays towards it
  */
 #ifndef CRT_BITS_VERSION_H
 #define CRT_BITS_VERSION_H
 
-#define CRT_BITS_VERSION 11u
+#define CRT_BITS_VERSION 12u
 
 #endif

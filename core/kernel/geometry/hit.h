@@ -14,16 +14,18 @@ typedef struct CrtHit {
     f32 t;       /* in lengths of the ray's direction */
     f32 b1, b2;  /* barycentrics of the second and third vertex */
     u32 slot;    /* in the triangle array; CRT_NONE: nothing hit */
-    u32 id;      /* primitive id */
+    u32 id;      /* primitive id; only where something was hit */
     u32 instance; /* 1 + the index of its CrtInstance; 0: none. Only where there are some */
 } CrtHit;
 
+/* No hit yet. Of equally near hits the lower id wins (crt_keep_nearer), and none is lower than this one's:
+   what lies at `reach` itself is no hit, as for crt_trace_any. */
 CRT_FN CrtHit crt_no_hit(f32 reach) {
     CrtHit hit;
     hit.t = reach;
     hit.b1 = hit.b2 = 0.0f;
     hit.slot = CRT_NONE;
-    hit.id = CRT_NONE;
+    hit.id = 0u;
     hit.instance = 0u;
     return hit;
 }

@@ -130,7 +130,7 @@ CRT_FN CrtLightSample crt_shape_light_sample(const CrtContext *ctx, u32 index, C
     if (!(facing > 0.0f || ((light->flags & CRT_LIGHT_TWO_SIDED) != 0u && facing < 0.0f))) return s;
     s.cosine = crt_abs(facing);
     s.pdf = light->choice_probability * crt_shape_density(view, light->area, s.cosine, s.distance);
-    if (s.pdf > 0.0f) s.reach = 1.0f - face->clearance / (s.cosine * s.distance);
+    if (s.pdf > 0.0f) s.reach = crt_reach(face->clearance, s.cosine, s.distance);
     return s;
 }
 
