@@ -8,7 +8,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <limits>
+#include <cmath>
 #include <string>
 
 using namespace kernel_test;
@@ -24,7 +24,7 @@ const char* const kLights[] = {
     "cylinder: {radius: 0.5, from_z: -1, to_z: 1}",
 };
 
-/// A light of half that size, turned at random, amid two triangles at the ends of a cube of edge 1.98: the
+/// A light of half size `size`, turned at random, amid two triangles at the ends of a cube of edge 1.98: the
 /// scene keeps its lengths when it is compiled.
 crt::CompiledScene sceneWith(const std::string& light, double size, const Vec3d& at, Random& random) {
     const Vec3d axis = random.direction();

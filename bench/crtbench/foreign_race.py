@@ -100,7 +100,7 @@ class Mitsuba(named.Mitsuba):
 def contestants(program, file, arguments):
     theirs = []
     for sampler in arguments.samplers:
-        target = program.scratch / f"{file.stem}_{sampler}.xml"
+        target = program.scratch / f"{name(file).replace('/', '_')}_{sampler}.xml"
         shape = prepared(file, target, sampler, arguments.size, arguments.depth)
         theirs += [Mitsuba(program, target, v, sampler, arguments.size) for v in arguments.variants]
     scene = imported(program, target)

@@ -44,7 +44,7 @@ typedef struct CrtLightSample {
 
 /* Rounding of the place where a ray meets a surface, over the length of the ray: of its direction and
    length, and of the differences, shears and products of the surface's test. Measured
-   (tests/unit_reach.cpp): a third of it would do. */
+   (tests/unit_reach.cpp): .36 of it would do. */
 #define CRT_RAY_ERROR CRT_GAMMA(16.0f)
 
 /* Share of the way to a point on an emitter that is sure to end before the emitter. Clearance and rounding
