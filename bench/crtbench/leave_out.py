@@ -24,9 +24,9 @@ def chosen_bits(program, names):
     return [b for b in bits if not names or b[1] in names]
 
 
-def compile_ahead(program, kernels, settings):
-    """Puts the CUDA kernels of (scene, environment) into the program's cache, by all processors: one by one,
-    compiling would take much longer than what is timed."""
+def compile_ahead(program, backend, kernels, settings):
+    """Puts the backend's kernels of (scene, environment) into the program's cache, by all processors: one by
+    one, compiling would take much longer than what is timed."""
 
     def compile_one(kernel):
         scene, environment = kernel
@@ -34,7 +34,7 @@ def compile_ahead(program, kernels, settings):
         apart.environment["CRT_CACHE_DIR"] = program.environment["CRT_CACHE_DIR"]
         tiny = ["film.resolution=[8,8]", *settings[1:]]
         waiting = ["--spp", 1, "--kernel", "lean-only"]
-        apart.render(scene, "cuda", waiting, settings=tiny, environment=environment)
+        apart.render(scene, backend, waiting, settings=tiny, environment=environment)
 
     with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as workers:
         list(workers.map(compile_one, kernels))
@@ -64,7 +64,7 @@ def measure(program, arguments):
     spp = {scene: 16 if scene == "cornell_box" else 8 for scene in scenes}
     usable, absent = program.backends(arguments.backends)
     # By which features are timed one by one: a GPU where there is one, with an image that fills it.
-    timed = "cuda" if "cuda" in usable else "opencl"   # Embree's kernels are compiled ahead.
+    timed = next((b for b in ("cuda", "embree", "opencl") if b in usable), None)
     if timed == "cuda" and not arguments.tiny:
         size, spp = 1440, {scene: 64 for scene in scenes}
     settings = [f"film.resolution=[{size},{size}]", NO_AOVS]
@@ -101,11 +101,13 @@ def measure(program, arguments):
             images = {
                 kernel: program.scratch / f"{scene}-{backend}-{kernel}.pfm" for kernel in ("lean", "full")
             }
+            # Not "lean", which begins with what is there while it compiles.
+            asked = {"lean": "lean-only", "full": "full"}
             for kernel, image in images.items():
-                render(scene, backend, kernel, [image])
+                render(scene, backend, asked[kernel], [image])
             different = program.compare(images["lean"], images["full"])["differing_pixels"]
             kept = program.interleaved(
-                {kernel: lambda kernel=kernel: render(scene, backend, kernel) for kernel in images}, runs
+                {k: lambda k=k: render(scene, backend, asked[k]) for k in images}, runs
             )
             seconds = {kernel: [r.value("seconds", "render") for r in done] for kernel, done in kept.items()}
             memory = {
@@ -138,8 +140,7 @@ def measure(program, arguments):
         f"{size} × {size} pixels; {', '.join(f'{s} {spp[s]}' for s in scenes)} samples per pixel. Render "
         f"seconds without start, median of {runs} "
         "interleaved runs, in brackets the least and the most; the ratio is taken run by run. Memory is the "
-        "process's peak. Embree's lean kernel is the "
-        "smallest of those it has compiled ahead that covers the scene."
+        "process's peak."
     )
     results.table(
         ["scene", "backend", "same bits", "s, lean", "s, full", "full : lean", "MB, lean", "MB, full"], rows
@@ -196,9 +197,10 @@ def measure(program, arguments):
     )
     rows, data["features"] = [], {}
     extra_variants = {}
-    if timed == "cuda":
+    if timed in ("cuda", "embree"):
         compile_ahead(
             program,
+            timed,
             [
                 (scene, {"CRT_KERNEL_DIR": str(program.kernels_with(1 << bit, all_masks))})
                 for bit, _, _ in bits
@@ -219,11 +221,11 @@ def measure(program, arguments):
             if masks[scene] & 1 << bit:
                 entry["scenes"][scene] = None  # The scene needs it.
                 continue
-            if timed in usable and name in ROWS_OF_WAVES and timed == "cuda" and in_waves(program, scene):
+            if timed == "cuda" and name in ROWS_OF_WAVES and in_waves(program, scene):
                 found = {"not_measured": "its waves have no rows for it"}
-            elif timed in usable and not same_image(scene, environment):
+            elif timed and not same_image(scene, environment):
                 found = {"not_measured": "**another image**"}
-            elif timed in usable:
+            elif timed:
                 kept = program.interleaved(
                     {
                         "lean": lambda: render(scene, timed, "lean-only"),
@@ -259,7 +261,7 @@ def measure(program, arguments):
     results.not_measured(absent)
     for scene in scenes:
         results.command(
-            f"crt render configs/{scene}.yaml --backend BACKEND --kernel lean|full --spp {spp[scene]} "
+            f"crt render configs/{scene}.yaml --backend BACKEND --kernel lean-only|full --spp {spp[scene]} "
             + " ".join(f"--set '{c}'" for c in settings)
             + " -o unseen.pfm"
         )

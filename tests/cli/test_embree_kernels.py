@@ -141,6 +141,17 @@ class LeanKernels(CliTest):
         self.assertIn("box", self.backend("a.pfm")["kernel"])
         self.assertFalse(os.path.exists(self.path("it-ran")))
 
+    def test_other_kernel_texts_are_compiled_where_a_kernel_for_the_scene_is_there(self):
+        self.write("scene.yaml", harness.SCENE)
+        self.render("full.pfm", "--kernel", "full")
+        texts = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "core", "kernel")
+        shutil.copytree(texts, self.path("kernel"))
+        with open(self.path("kernel/lights/light.h"), "a", encoding="utf-8") as header:
+            header.write("#error other texts\n")
+        run = self.render("a.pfm", *self.LEAN, CRT_KERNEL_DIR=self.path("kernel"))
+        self.assertIn("#error other texts", run.stderr)
+        self.assert_precompiled("a.pfm")
+
     def test_a_short_render_starts_no_compiler(self):
         self.render("a.pfm", CRT_CXX=self.script("counted", f"touch {self.path('it-ran')}; exit 1"))
         self.assert_precompiled("a.pfm")
