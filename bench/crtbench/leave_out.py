@@ -63,8 +63,10 @@ def measure(program, arguments):
     scenes = program.scenes(arguments.scenes or SCENES)
     spp = {scene: 16 if scene == "cornell_box" else 8 for scene in scenes}
     usable, absent = program.backends(arguments.backends)
+    if not usable:
+        raise Failure("; ".join(f"{backend}: {why}" for backend, why in absent.items()))
     # By which features are timed one by one: a GPU where there is one, with an image that fills it.
-    timed = next((b for b in ("cuda", "embree", "opencl") if b in usable), None)
+    timed = next(b for b in ("cuda", "embree", "opencl") if b in usable)
     if timed == "cuda" and not arguments.tiny:
         size, spp = 1440, {scene: 64 for scene in scenes}
     settings = [f"film.resolution=[{size},{size}]", NO_AOVS]
@@ -74,6 +76,8 @@ def measure(program, arguments):
     masks = {scene: scene_mask(program, scene, [NO_AOVS]) for scene in scenes}
     file_masks = {scene: scene_mask(program, scene) for scene in scenes}   # With the AOVs of its file.
     all_masks = sorted({*masks.values(), *file_masks.values()})
+    # A kernel that is compiled ahead has other flags than one that is compiled for this machine.
+    alone = {"CRT_KERNEL_DIR": str(program.kernels_with(0, all_masks))}
 
     def render(scene, backend, kernel, outputs=(), environment=None):
         return program.render(
@@ -89,7 +93,7 @@ def measure(program, arguments):
         """True if the kernel with the feature more does the same work: it renders the same bits."""
         images = [program.scratch / f"{scene}-{which}.pfm" for which in ("without", "with")]
         if not images[0].exists():
-            render(scene, timed, "lean-only", [images[0]])
+            render(scene, timed, "lean-only", [images[0]], environment=alone)
         render(scene, timed, "lean-only", [images[1]], environment=environment)
         return program.compare(*images)["differing_pixels"] == 0
 
@@ -223,12 +227,12 @@ def measure(program, arguments):
                 continue
             if timed == "cuda" and name in ROWS_OF_WAVES and in_waves(program, scene):
                 found = {"not_measured": "its waves have no rows for it"}
-            elif timed and not same_image(scene, environment):
+            elif not same_image(scene, environment):
                 found = {"not_measured": "**another image**"}
-            elif timed:
+            else:
                 kept = program.interleaved(
                     {
-                        "lean": lambda: render(scene, timed, "lean-only"),
+                        "lean": lambda: render(scene, timed, "lean-only", environment=alone),
                         "more": lambda: render(scene, timed, "lean-only", environment=environment),
                     },
                     runs,
@@ -249,14 +253,14 @@ def measure(program, arguments):
         print(rows[-1], flush=True)
     results.table(["feature", *scenes], rows)
     results.claim(
-        "What one unused feature costs a kernel",
+        "What one unused feature costs a kernel" + (" on a processor" if timed != "cuda" else ""),
         f"The scene's own kernel with one feature that the scene does not use, over the kernel without it: "
         f"seconds of rendering on `{timed}`, {size} × {size} pixels, no AOVs, median of {runs} interleaved "
         f"runs.",
         ["feature", *scenes],
         [[f"`{name}`", *(feature_cell(entry["scenes"][scene]) for scene in scenes)]
          for name, entry in data["features"].items()],
-        name="leave-out-features",
+        name="leave-out-features" if timed == "cuda" else f"leave-out-features-{timed}",
     )
     results.not_measured(absent)
     for scene in scenes:
