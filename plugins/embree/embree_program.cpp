@@ -55,8 +55,9 @@ EmbreeProgram::EmbreeProgram(const plugin::Host& host, std::uint64_t scene_featu
       precompiled_(choosePrecompiled(scene_features, choice)),
       current_(precompiled_.render),
       compile_after_seconds_(compileAfterSeconds()) {
-    // CRT_KERNEL_DIR: other kernel texts, which nothing that was compiled before has.
-    const bool other_texts = std::getenv("CRT_KERNEL_DIR") != nullptr;
+    // Kernels that are compiled ahead do not have the texts of CRT_KERNEL_DIR.
+    const char* const directory = std::getenv("CRT_KERNEL_DIR");
+    const bool other_texts = directory != nullptr && *directory != '\0';
     if (choice == CRT_KERNEL_FULL || (precompiled_.is_lean_enough && !other_texts)) return;
     openCompiler();
     if (choice != CRT_KERNEL_LEAN_ONLY || lean_) return;
