@@ -16,6 +16,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <filesystem>
 #include <set>
 #include <stdexcept>
@@ -71,6 +72,21 @@ TEST_CASE("a compiler that was replaced is another one", "[embree_program]") {
         cacheKey("text", before, 0x50)};
     CHECK(keys.size() == 4);
     CHECK(keys.count(cacheKey("text", before, 0x51)) == 1);
+}
+
+TEST_CASE("a kernel is compiled when its render is long enough to gain from it", "[embree_program]") {
+    CHECK(compileAfterSeconds(false, false, nullptr) == kSecondsBeforeCompiling);
+    CHECK(compileAfterSeconds(false, true, nullptr) == kSecondsBeforeCompiling);
+    CHECK(compileAfterSeconds(true, true, nullptr) == kSecondsBeforeVectorizing);
+    for (const char* const said : {static_cast<const char*>(nullptr), "0"})
+        CHECK(std::isinf(compileAfterSeconds(true, false, said)));
+    for (const bool is_lean_enough : {false, true}) {
+        CHECK(compileAfterSeconds(is_lean_enough, true, "0") == 0);
+        CHECK(compileAfterSeconds(is_lean_enough, true, "2.5") == 2.5);
+        for (const char* const nonsense : {"", "-1", "4s", "nan", "soon"})
+            CHECK(compileAfterSeconds(is_lean_enough, true, nonsense) ==
+                  compileAfterSeconds(is_lean_enough, true, nullptr));
+    }
 }
 
 TEST_CASE("no option of a lean kernel relaxes arithmetic", "[embree_program]") {

@@ -102,7 +102,7 @@ constexpr std::array kVariables{
         "The C++ compiler of lean Embree kernels, instead of the first of c++, g++ and clang++ in PATH."},
     Variable{"CRT_COMPILE_AFTER",
              "Seconds of rendering, of all processors together, after which the Embree backend compiles a "
-             "lean kernel, instead of 4."},
+             "lean kernel, instead of 4, or 60 where only AVX-512 makes it faster."},
     Variable{"CUDA_HOME", "The path of NVRTC, if the system does not find it."},
     Variable{"CRT_SCENE_MEMORY",
              "The maximum memory of a scene after its placements and aliases are expanded, such as 20GB."},

@@ -50,13 +50,6 @@ std::string inFolders(const std::string& name, const char* search_path) {
     return {};
 }
 
-/// True for x86-64-v4: the same operations with twice the registers, and comparisons into masks.
-bool processorHasAvx512() {
-    return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
-           __builtin_cpu_supports("avx512cd") && __builtin_cpu_supports("avx512dq") &&
-           __builtin_cpu_supports("avx512vl");
-}
-
 Compiler compilerAt(const std::string& path) {
     const std::filesystem::path file = std::filesystem::canonical(path);
     struct stat status {};
@@ -66,6 +59,12 @@ Compiler compilerAt(const std::string& path) {
 }
 
 }  // namespace
+
+bool processorHasAvx512() {
+    return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
+           __builtin_cpu_supports("avx512cd") && __builtin_cpu_supports("avx512dq") &&
+           __builtin_cpu_supports("avx512vl");
+}
 
 Compiler findCompiler(const char* wanted, const char* search_path) {
     if (wanted != nullptr && *wanted != '\0') {

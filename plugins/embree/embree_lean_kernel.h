@@ -26,6 +26,9 @@ Compiler findCompiler(const char* wanted, const char* search_path);
 /// text of kernel/schedule/pixel.h.
 std::string kernelText(const std::string& pixel_text);
 
+/// True for x86-64-v4: the same operations with twice the registers, and comparisons into masks.
+bool processorHasAvx512();
+
 /// Arithmetic stays IEEE. The instruction set is that of the kernels that are compiled ahead, or AVX-512
 /// where this processor has it.
 std::vector<std::string> compilerOptions(const Compiler& compiler, std::uint64_t features);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdlib>
 #include <exception>
 #include <iterator>
@@ -31,11 +32,10 @@ double secondsSince(Clock::time_point start) {
     return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-double compileAfterSeconds() {
-    const char* const said = std::getenv("CRT_COMPILE_AFTER");
-    char* end = nullptr;
-    const double seconds = said != nullptr ? std::strtod(said, &end) : 0;
-    return end != said && end != nullptr && *end == '\0' && seconds >= 0 ? seconds : kSecondsBeforeCompiling;
+/// Kernels that are compiled ahead do not have the texts of CRT_KERNEL_DIR.
+bool hasOtherTexts() {
+    const char* const directory = std::getenv("CRT_KERNEL_DIR");
+    return directory != nullptr && *directory != '\0';
 }
 
 }  // namespace
@@ -49,16 +49,22 @@ const Precompiled& choosePrecompiled(std::uint64_t scene_features, CrtKernelChoi
 
 std::span<const Precompiled> allPrecompiled() { return kPrograms; }
 
+double compileAfterSeconds(bool is_lean_enough, bool has_avx512, const char* said) {
+    if (is_lean_enough && !has_avx512) return std::numeric_limits<double>::infinity();
+    char* end = nullptr;
+    const double seconds = said != nullptr ? std::strtod(said, &end) : -1;
+    if (end != said && end != nullptr && *end == '\0' && seconds >= 0) return seconds;
+    return is_lean_enough ? kSecondsBeforeVectorizing : kSecondsBeforeCompiling;
+}
+
 EmbreeProgram::EmbreeProgram(const plugin::Host& host, std::uint64_t scene_features, CrtKernelChoice choice)
     : host_(host),
       scene_features_(scene_features),
       precompiled_(choosePrecompiled(scene_features, choice)),
       current_(precompiled_.render),
-      compile_after_seconds_(compileAfterSeconds()) {
-    // Kernels that are compiled ahead do not have the texts of CRT_KERNEL_DIR.
-    const char* const directory = std::getenv("CRT_KERNEL_DIR");
-    const bool other_texts = directory != nullptr && *directory != '\0';
-    if (choice == CRT_KERNEL_FULL || (precompiled_.is_lean_enough && !other_texts)) return;
+      compile_after_seconds_(compileAfterSeconds(precompiled_.is_lean_enough && !hasOtherTexts(),
+                                                 processorHasAvx512(), std::getenv("CRT_COMPILE_AFTER"))) {
+    if (choice == CRT_KERNEL_FULL || std::isinf(compile_after_seconds_)) return;
     openCompiler();
     if (choice != CRT_KERNEL_LEAN_ONLY || lean_) return;
     while (compiler_) {

@@ -23,7 +23,7 @@ struct Precompiled {
     const char* name;
     std::uint64_t features;
     RenderTile render;
-    bool is_lean_enough;  ///< A kernel of the scene's features alone is no faster, by measurement.
+    bool is_lean_enough;  ///< Leaving out what a scene does not need gains nothing, by measurement.
 };
 
 /// Smallest mask first; the last one has all features.
@@ -32,10 +32,16 @@ std::span<const Precompiled> allPrecompiled();
 /// The smallest one that covers the scene.
 const Precompiled& choosePrecompiled(std::uint64_t scene_features, CrtKernelChoice choice);
 
-/// Processor seconds of rendering after which the compiler is started, unless the environment's
-/// CRT_COMPILE_AFTER says others. The compiler takes about as many: however long the render is, both
-/// together take at most twice the time of the better choice.
+/// Processor seconds of rendering after which the compiler is started. The compiler takes about as many:
+/// however long the render is, both together take at most twice the time of the better choice.
 constexpr double kSecondsBeforeCompiling = 4;
+/// The same where a kernel gains from AVX-512 alone, which is some 5 % of the time: a render of this length
+/// gains what the compiler takes.
+constexpr double kSecondsBeforeVectorizing = 60;
+
+/// After how many processor seconds of rendering a scene has its own kernel compiled; infinitely many where
+/// that gains nothing. `said` is the environment's CRT_COMPILE_AFTER, or null.
+double compileAfterSeconds(bool is_lean_enough, bool has_avx512, const char* said);
 
 /// The kernels for one scene.
 class EmbreeProgram {

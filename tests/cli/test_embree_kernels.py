@@ -36,7 +36,7 @@ class LeanKernels(CliTest):
 
     def setUp(self):
         super().setUp()
-        # Plastic is not in the small kernels that are compiled ahead, which are used as they are.
+        # Plastic is not in the small kernels that are compiled ahead, which are used on any processor.
         self.write("scene.yaml", harness.SCENE.replace("{type: diffuse, reflectance: 0.7}",
                                                        "{type: plastic, reflectance: 0.7, roughness: 0.3}"))
         self.render("full.pfm", "--kernel", "full")
@@ -132,14 +132,20 @@ class LeanKernels(CliTest):
         self.assertIn("refused", run.stderr)
         self.assertFalse(os.path.exists(self.path("it-ran")))
 
-    def test_a_plain_scene_needs_no_compiler(self):
+    def test_a_plain_scene_gains_from_avx_512_alone(self):
         self.write("scene.yaml", harness.SCENE)
         self.render("full.pfm", "--kernel", "full")
-        counted = self.script("counted", f"touch {self.path('it-ran')}; exit 1")
-        self.render("a.pfm", *self.LEAN, CRT_CXX=counted, CRT_COMPILE_AFTER="0")
-        self.assert_same("a.pfm")
+        counted = self.script("counted", f'touch {self.path("it-ran")}; exec c++ "$@"')
+        self.render("a.pfm", CRT_CXX=counted)
+        self.assert_precompiled("a.pfm")
         self.assertIn("box", self.backend("a.pfm")["kernel"])
         self.assertFalse(os.path.exists(self.path("it-ran")))
+        with open("/proc/cpuinfo", encoding="utf-8") as file:
+            has_avx512 = "avx512vl" in file.read()
+        self.render("b.pfm", *self.LEAN, CRT_CXX=counted)
+        self.assert_same("b.pfm")
+        self.assertEqual(os.path.exists(self.path("it-ran")), has_avx512)
+        self.assertEqual("lean" in self.backend("b.pfm")["kernel"], has_avx512)
 
     def test_other_kernel_texts_are_compiled_where_a_kernel_for_the_scene_is_there(self):
         self.write("scene.yaml", harness.SCENE)
