@@ -151,16 +151,19 @@ def best(found, who):
     return min(times) if times else None
 
 
-def errors_at(found, *programs):
-    """The least error of each program at the largest number of samples that all their contestants have,
-    after that number."""
-    groups = [[points for name, (points, _) in found.items() if name.startswith(who)] for who in programs]
+def errors_beside(found, who):
+    """{samples: the least error of crt over the least of the other program}, of numbers of samples that all
+    contestants of both have; ascending."""
+    groups = [[points for name, (points, _) in found.items() if name.startswith(program)]
+              for program in ("crt", who)]
+    if not all(groups):
+        return {}
     common = set.intersection(*({p.samples for p in points} for points in sum(groups, [])))
-    if not common:
-        return None
-    samples = max(common)
-    least = (min(p.error for points in group for p in points if p.samples == samples) for group in groups)
-    return samples, *least
+
+    def least(group, samples):
+        return min(p.error for points in group for p in points if p.samples == samples)
+
+    return {n: least(groups[0], n) / least(groups[1], n) for n in sorted(common)}
 
 
 def row(scene, name, points, seconds):
@@ -176,11 +179,9 @@ def against(found, who):
     ratio = found.ratio([who])
     said = f"**{ratio:.2f}**" if ratio else "not known: the target was not reached"
     equal = ""
-    if errors := errors_at(found.found, "crt", who):
-        equal = (
-            f"; at {errors[0]} samples in all of them the error of crt over the least of {who}'s is "
-            f"{errors[1] / errors[2]:.2f}"
-        )
+    if errors := errors_beside(found.found, who):
+        samples, error = max(errors.items())
+        equal = f"; at {samples} samples the error of crt over the least of {who}'s is {error:.2f}"
     return (
         f"time of crt's best over that of {who}'s best {said}{equal}. {who}'s converged image has "
         f"{theirs.luminance / ours.luminance - 1:+.2%} in luminance beside crt's, and its pixels differ by "
@@ -223,7 +224,7 @@ def measure(program, arguments):
     write_inputs(program.scratch)
     others = ["Mitsuba" if who == "mitsuba" else peers.KINDS[who].name for who in arguments.peers]
     results = Results(program, arguments, arguments.name, "Who reaches 1 % first where surfaces are rich?")
-    rows, notes, claimed = [], [], []
+    rows, notes, claimed, errors = [], [], [], {}
     before = crt.processor_seconds() - time.process_time() - crt.children_seconds()
     begin = time.monotonic()
     for file in files:
@@ -231,6 +232,7 @@ def measure(program, arguments):
         rows += [row(found.scene, name, points, seconds) for name, (points, seconds) in found.found.items()]
         notes += sentences(found)
         claimed.append(summary(found, others))
+        errors[found.scene] = errors_beside(found.found, others[0])
         print(*sentences(found), sep="\n", flush=True)
         results.data[found.scene] = {
             name: {"points": [dataclasses.asdict(p) for p in points], "seconds_to_target": seconds}
@@ -265,6 +267,17 @@ def measure(program, arguments):
         ["scene", "crt, s", *(f"{who}, s" for who in others),
          f"crt : {others[0]}" if len(others) == 1 else "crt : best peer"],
         claimed,
+    )
+    numbers = sorted(set().union(*errors.values()))
+    results.claim(
+        f"Error at equal samples beside {others[0]}",
+        f"RMSE of luminance of crt's image over that of {others[0]}'s best one with as many samples, each "
+        f"against its own converged image; {pixels}, {arguments.renders} renders. *–*: the target of the "
+        "race was reached before.",
+        ["scene", *(f"{n:,} samples" for n in numbers)],
+        [[f"`{scene}`", *(f"{found[n]:.2f}" if n in found else "–" for n in numbers)]
+         for scene, found in errors.items()],
+        name=f"{arguments.name}-errors",
     )
     results.write()
     return 0
