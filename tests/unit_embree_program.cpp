@@ -16,7 +16,6 @@
 
 #include <algorithm>
 #include <bit>
-#include <cmath>
 #include <filesystem>
 #include <set>
 #include <stdexcept>
@@ -79,7 +78,7 @@ TEST_CASE("a kernel is compiled when its render is long enough to gain from it",
     CHECK(compileAfterSeconds(false, true, nullptr) == kSecondsBeforeCompiling);
     CHECK(compileAfterSeconds(true, true, nullptr) == kSecondsBeforeVectorizing);
     for (const char* const said : {static_cast<const char*>(nullptr), "0"})
-        CHECK(std::isinf(compileAfterSeconds(true, false, said)));
+        CHECK(!compileAfterSeconds(true, false, said));
     for (const bool is_lean_enough : {false, true}) {
         CHECK(compileAfterSeconds(is_lean_enough, true, "0") == 0);
         CHECK(compileAfterSeconds(is_lean_enough, true, "2.5") == 2.5);

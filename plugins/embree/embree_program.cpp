@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <cstdlib>
 #include <exception>
 #include <iterator>
@@ -49,8 +48,8 @@ const Precompiled& choosePrecompiled(std::uint64_t scene_features, CrtKernelChoi
 
 std::span<const Precompiled> allPrecompiled() { return kPrograms; }
 
-double compileAfterSeconds(bool is_lean_enough, bool has_avx512, const char* said) {
-    if (is_lean_enough && !has_avx512) return std::numeric_limits<double>::infinity();
+std::optional<double> compileAfterSeconds(bool is_lean_enough, bool has_avx512, const char* said) {
+    if (is_lean_enough && !has_avx512) return std::nullopt;
     char* end = nullptr;
     const double seconds = said != nullptr ? std::strtod(said, &end) : -1;
     if (end != said && end != nullptr && *end == '\0' && seconds >= 0) return seconds;
@@ -64,7 +63,7 @@ EmbreeProgram::EmbreeProgram(const plugin::Host& host, std::uint64_t scene_featu
       current_(precompiled_.render),
       compile_after_seconds_(compileAfterSeconds(precompiled_.is_lean_enough && !hasOtherTexts(),
                                                  processorHasAvx512(), std::getenv("CRT_COMPILE_AFTER"))) {
-    if (choice == CRT_KERNEL_FULL || std::isinf(compile_after_seconds_)) return;
+    if (choice == CRT_KERNEL_FULL || !compile_after_seconds_) return;
     openCompiler();
     if (choice != CRT_KERNEL_LEAN_ONLY || lean_) return;
     while (compiler_) {
@@ -132,7 +131,7 @@ void EmbreeProgram::poll(double rendered) {
     if (!compiler_) return;
     if (!process_) {
         rendered_precompiled_ = true;
-        if (rendered >= compile_after_seconds_) startCompiling();
+        if (rendered >= *compile_after_seconds_) startCompiling();
         return;
     }
     try {

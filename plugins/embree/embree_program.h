@@ -39,9 +39,9 @@ constexpr double kSecondsBeforeCompiling = 4;
 /// gains what the compiler takes.
 constexpr double kSecondsBeforeVectorizing = 60;
 
-/// After how many processor seconds of rendering a scene has its own kernel compiled; infinitely many where
-/// that gains nothing. `said` is the environment's CRT_COMPILE_AFTER, or null.
-double compileAfterSeconds(bool is_lean_enough, bool has_avx512, const char* said);
+/// After how many processor seconds of rendering a scene has its own kernel compiled; nothing where it never
+/// has, because it would gain nothing. `said` is the environment's CRT_COMPILE_AFTER, or null.
+std::optional<double> compileAfterSeconds(bool is_lean_enough, bool has_avx512, const char* said);
 
 /// The kernels for one scene.
 class EmbreeProgram {
@@ -79,7 +79,8 @@ private:
     std::unique_ptr<plugin::CompileProcess> process_;
     std::optional<LeanKernel> lean_;
     bool rendered_precompiled_ = false, from_cache_ = false;
-    double compile_after_seconds_, compile_seconds_ = 0, cache_seconds_ = 0;
+    std::optional<double> compile_after_seconds_;
+    double compile_seconds_ = 0, cache_seconds_ = 0;
 };
 
 }  // namespace crt::embree
