@@ -65,6 +65,26 @@ TEST_CASE("the scenes of the relations need together all that the kernel has", "
     CHECK(together == CRT_FEATURES_ALL);
 }
 
+TEST_CASE("the parts of one run share a column of docs/stability.md", "[verify][docs]") {
+    const auto part = [](const char* backend, const char* id) {
+        return fmt::format(R"({{"backend": {{"name": "{}", "device": "a device"}}, "level": "commit",
+                               "crt": {{"version": "1"}},
+                               "cases": [{{"id": "{}", "verdict": "{}", "outcomes": []}}]}})",
+                           backend, id, id[0] == 'A' ? "pass" : "FAIL");
+    };
+    const std::string text =
+        registryMarkdown({part("one", "A01"), part("one", "B01"), part("other", "A01")});
+    const auto lineFrom = [&](const char* begin) {
+        const std::size_t at = text.find(begin);
+        REQUIRE(at != std::string::npos);
+        return text.substr(at, text.find('\n', at) - at);
+    };
+    CHECK_THAT(lineFrom("| A01 "), Catch::EndsWith("| commit | pass | pass |"));
+    CHECK_THAT(lineFrom("| B01 "), Catch::EndsWith(" | FAIL | – |"));
+    CHECK(text.find("Figures of one: level commit, a device, crt 1") != std::string::npos);
+    CHECK(text.find("Figures of one:", text.find("Figures of one:") + 1) == std::string::npos);
+}
+
 TEST_CASE("docs/stability.md is what the registry says", "[verify][docs]") {
     std::ifstream in(CRT_SOURCE_DIR "/docs/stability.md");
     const std::string text{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};

@@ -22,7 +22,8 @@ std::string listText(const std::vector<const Case*>& cases);
 /// The row of a case in docs/stability.md, but for the figures that end it.
 std::string markdownRow(const Case& c);
 /// docs/stability.md: every case of the registry, with the figures of `suites` (verify.json texts) where
-/// they have any. Made, never written by hand.
+/// they have any; those of one backend, such as the parts of one run, share a column. Made, never written
+/// by hand.
 std::string registryMarkdown(const std::vector<std::string>& suites);
 
 }  // namespace crt::verify

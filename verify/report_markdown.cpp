@@ -16,7 +16,8 @@ namespace {
 constexpr const char* kPreamble = R"(# Stability: the cases of crt verify
 
 <!-- Generated from the registry in verify/. Change it there, then run
-     crt verify --markdown --figures embree/verify.json --figures opencl/verify.json > docs/stability.md -->
+     crt verify --markdown --figures cuda/verify.json --figures embree/verify.json \
+         --figures opencl/verify.json > docs/stability.md -->
 
 `crt verify` renders scenes with known answers and reports whether the backend finds them. It takes any
 backend, including those that are not part of crt:
@@ -72,12 +73,15 @@ std::string registryMarkdown(const std::vector<std::string>& suites) {
     for (const std::string& suite : suites) {
         const nlohmann::json json = nlohmann::json::parse(suite);
         const std::string backend = json.at("backend").at("name");
-        backends.push_back(backend);
-        text += fmt::format(
-            "\nFigures of {}: level {}, {}, crt {}; the largest deviation "
-            "of a case's answers from what is expected.\n",
-            backend, json.at("level").get<std::string>(), json.at("backend").at("device").get<std::string>(),
-            json.at("crt").at("version").get<std::string>());
+        if (std::find(backends.begin(), backends.end(), backend) == backends.end()) {
+            backends.push_back(backend);
+            text += fmt::format(
+                "\nFigures of {}: level {}, {}, crt {}; the largest deviation "
+                "of a case's answers from what is expected.\n",
+                backend, json.at("level").get<std::string>(),
+                json.at("backend").at("device").get<std::string>(),
+                json.at("crt").at("version").get<std::string>());
+        }
         for (const nlohmann::json& c : json.at("cases")) figures[{backend, c.at("id")}] = figureOf(c);
     }
     char group = 0;

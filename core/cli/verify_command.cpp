@@ -93,7 +93,8 @@ OptionGroup output(Request& to) {
          {.names = "--markdown", .placeholder = {}, .help = "print docs/stability.md instead", .read = {}},
          {.names = "--figures",
           .placeholder = "FILE",
-          .help = "with --markdown: a verify.json whose numbers to include; repeatable",
+          .help = "with --markdown: a verify.json whose numbers to include; repeatable, also for the parts "
+                  "of one run",
           .read = {},
           .completion = completeFile({"json"}),
           .repeatable = true}},
