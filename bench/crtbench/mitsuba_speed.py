@@ -60,11 +60,8 @@ def seconds_to_error(program, file, arguments):
         whose: race.Converged(first.render, arguments.reference_samples)
         for whose, first in (("crt", racing[0]), ("Mitsuba", racing[1]))
     }
-    found = {}
-    for contestant in racing:
-        points = race.points_to(contestant, references[contestant.name.split()[0]], arguments)
-        found[contestant.name] = (points, race.time_to(points, arguments.target))
-    return found
+    points = race.points_of({c: references[c.name.split()[0]] for c in racing}, arguments)
+    return {c.name: (points[c], race.time_to(points[c], arguments.target)) for c in racing}
 
 
 def cells(file, rated, raced):

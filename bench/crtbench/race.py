@@ -48,26 +48,35 @@ class Converged:
         return math.sqrt(max(squared, 0.0)) / self.luminance
 
 
-def points_to(contestant, converged, arguments):
-    """Points of growing numbers of samples, until one is below the target."""
-    points, samples = [], FIRST
-    while samples <= arguments.most:
-        contestant.warm_up(samples)
-        costs = [contestant.render(samples, 1000 + r) for r in range(arguments.renders)]
-        point = Point(
-            costs[0].samples,
-            converged.error_of([c.luminance for c in costs]),
-            float(np.median([c.seconds for c in costs])),
-        )
-        points.append(point)
-        print(
-            f"{contestant.name:40} {point.samples:6} spp {point.error:8.3%} {point.seconds:8.3f} s",
-            flush=True,
-        )
-        if point.error < arguments.target and len(points) > 1:
-            break
+def points_of(converged, arguments):
+    """{contestant: its points of growing numbers of samples, until one is below the target}. `converged`:
+    {contestant: its program's converged image}. They render in turn, so that a machine that becomes slower
+    does so for all."""
+    points, racing, samples = {c: [] for c in converged}, list(converged), FIRST
+    while racing and samples <= arguments.most:
+        costs = {c: [] for c in racing}
+        for contestant in racing:
+            contestant.warm_up(samples)
+        for render in range(arguments.renders):
+            for contestant in racing:
+                costs[contestant].append(contestant.render(samples, 1000 + render))
+        for contestant in racing:
+            points[contestant].append(point_of(contestant, costs[contestant], converged[contestant]))
+        racing = [c for c in racing if points[c][-1].error >= arguments.target or len(points[c]) < 2]
         samples *= FACTOR
     return points
+
+
+def point_of(contestant, costs, converged):
+    point = Point(
+        costs[0].samples,
+        converged.error_of([c.luminance for c in costs]),
+        float(np.median([c.seconds for c in costs])),
+    )
+    print(
+        f"{contestant.name:40} {point.samples:6} spp {point.error:8.3%} {point.seconds:8.3f} s", flush=True
+    )
+    return point
 
 
 def time_to(points, target):
@@ -133,13 +142,13 @@ def race(program, file, arguments):
     else:
         name, title = file.stem, agree_scene.title(file)
         racing, absent = contestants_of(program, file, arguments)
-    references, found = {}, {}
+    references, converged = {}, {}
     for who, group in racing.items():
         references[who] = Converged(group[0].render, arguments.reference_samples)
         print(f"{name}: converged image of {who}: {references[who].error:.2%} itself", flush=True)
-        for contestant in group:
-            points = points_to(contestant, references[who], arguments)
-            found[contestant.name] = (points, time_to(points, arguments.target))
+        converged |= dict.fromkeys(group, references[who])
+    points = points_of(converged, arguments)
+    found = {c.name: (points[c], time_to(points[c], arguments.target)) for c in points}
     for contestant in sum(racing.values(), []):
         if isinstance(contestant, peers.Peer):
             contestant.close()
