@@ -272,7 +272,7 @@ def measure(program, arguments):
         "Complex scenes beside Mitsuba 3 on a processor" if others == ["Mitsuba"]
         else "Scenes beside other renderers on a processor",
         f"Seconds of rendering until the RMSE of luminance is {arguments.target:.0%} of the mean; "
-        f"{pixels}, no roulette. The best of each program's samplers counts.",
+        f"{pixels}, no roulette. The programs render in turn, and the best of each one's samplers counts.",
         ["scene", "crt, s", *(f"{who}, s" for who in others),
          f"crt : {others[0]}" if len(others) == 1 else "crt : best peer"],
         claimed,
