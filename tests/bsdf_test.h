@@ -97,6 +97,18 @@ inline Material clay(Material m, double roughness) {
     return m;
 }
 
+inline Material tinted(Material m, double tint) {
+    m.tint = crt::constantSpectrum(tint);
+    return m;
+}
+
+/// Its roughness is a texture, of this many twentieths everywhere, and not its number.
+inline Material varying(Material m, crt::TextureIndex twentieths) {
+    m.roughness = 0.9;
+    m.roughness_texture = twentieths;
+    return m;
+}
+
 inline Material fuzzy(Material m, double weight, double color, double roughness) {
     m.fuzz = weight;
     m.fuzz_color = crt::constantSpectrum(color);
@@ -111,6 +123,15 @@ inline Material lacquered(Material m, const crt::verify::Lacquer& lacquer) {
     coat.depth = crt::constantSpectrum(-std::log(lacquer.color) / 2);
     coat.darkening = lacquer.darkening;
     coat.base_roughness = lacquer.base_roughness;
+    return m;
+}
+
+/// The same coat, of a roughness that is a texture. The layers below get rougher by it.
+inline Material lacqueredByPlace(Material m, crt::verify::Lacquer lacquer, crt::TextureIndex twentieths) {
+    lacquer.roughness = 0.9;
+    m = lacquered(m, lacquer);
+    m.clearcoat->roughness_texture = twentieths;
+    m.clearcoat->roughens = true;
     return m;
 }
 
@@ -161,6 +182,12 @@ inline std::vector<Subject> subjects() {
     const auto of_film = [](double n, double k, double thickness_nm, double index) {
         return [=](double cosine) {
             return crt::verify::filmReflectance(std::abs(cosine), index, thickness_nm, 360 + 230, {n, k});
+        };
+    };
+    // A perfect metal's facets mirror all light: of a tint it is as if that were their reflectance.
+    const auto of_tinted = [](double tint, double roughness) {
+        return [=](double cosine) {
+            return crt::verify::tintedMetalAlbedo(std::abs(cosine), 1, 1, tint, roughness);
         };
     };
     const auto coat = [](double cosine) { return fresnel(std::abs(cosine), 1.5); };
@@ -293,6 +320,31 @@ inline std::vector<Subject> subjects() {
         {"rough plastic", plastic(0.6, 0.5), coated(0.6, 0.5)},
         {"white rough plastic", plastic(1, 0.7), constant(1)},
         {"plastic without a coat", plastic(0.7, 0.3, 1), constant(0.7)},
+        {"tinted conductor", tinted(metal(MaterialType::Conductor, 0.2, 3), 0.6),
+         [=](double cosine) { return 0.6 * of_metal(0.2, 3)(cosine); }},
+        {"tinted rough perfect metal", tinted(roughMetal(1, 1e6, 0.5), 0.6), of_tinted(0.6, 0.5)},
+        {"tinted plastic", tinted(plastic(0.6, 0), 0.3),
+         [=](double cosine) { return coated(0.6, 0)(cosine) - 0.7 * coat(cosine); },
+         [=](double cosine) { return 0.3 * coat(cosine); }},
+        {"tinted rough plastic", tinted(plastic(0.6, 0.5), 0.3),
+         [=](double cosine) {
+             return coated(0.6, 0.5)(cosine) -
+                    0.7 * crt::verify::microfacetShares(std::abs(cosine), 1.5, 0.5).reflected;
+         }},
+        {"plastic, rough by place", varying(plastic(0.6, 0), 7), coated(0.6, 0.35)},
+        {"white plastic, rough by place", varying(plastic(1, 0), 13), constant(1)},
+        {"plastic, polished by place", varying(plastic(0.6, 0), 0), coated(0.6, 0), coat},
+        {"gloss, rough by place", varying(glossy(0.6, 0), 7), of_gloss(0.6, 0.35)},
+        {"gloss, rough by place, as rough as can be", varying(glossy(0.6, 0), 20), of_gloss(0.6, 1)},
+        {"satin lacquer by place on white", lacqueredByPlace(reflecting(MaterialType::Diffuse, 1), clear, 9),
+         constant(1), none, false},
+        {"amber lacquer by place on grey",
+         lacqueredByPlace(reflecting(MaterialType::Diffuse, 0.6), amber, 8), lacquer_on(amber, 0.6), none,
+         false, true},
+        {"lacquer by place on rough metal", lacqueredByPlace(roughMetal(1, 1e6, 0.3), clear, 6), constant(1),
+         none, false},
+        {"lacquer by place on gloss by place", lacqueredByPlace(varying(glossy(1, 0), 5), clear, 6),
+         constant(1), none, false},
     };
 }
 
@@ -307,6 +359,12 @@ public:
         crt::Scene scene = sceneOf(mesh);
         scene.materials = {material};
         scene.objects[0].material = 0;
+        for (int i = 0; i <= 20; ++i) {
+            crt::Texture& even = scene.textures.emplace_back();
+            even.kind = crt::Texture::Kind::Checker;
+            even.values = {crt::TextureValue{crt::constantSpectrum(i / 20.0), crt::kNoTexture},
+                           crt::TextureValue{crt::constantSpectrum(i / 20.0), crt::kNoTexture}};
+        }
         compiled_ = crt::compileScene(scene, 0);
         ctx_ = contextOf(compiled_);
         CrtHit hit = crt_no_hit(CRT_INFINITY);
@@ -365,7 +423,7 @@ inline double fartherFrom0(double a, double b) { return std::abs(b) <= a ? a : s
 /// Chance of a single direction, of a flat surface.
 inline double chanceOfSingle(const CrtBsdf& b) {
     double chance = (b.flags & CRT_BSDF_DELTA) != 0 ? 1 : 0;
-    if (b.type == CRT_MATERIAL_PLASTIC && b.coat == nullptr) chance = b.coat_chance;
+    if (b.type == CRT_MATERIAL_PLASTIC && b.coat.table == nullptr) chance = b.coat_chance;
     if (crt_is_coated(&b))
         chance = (1 - double{b.clear_chance}) * chance + (crt_is_coat_lobe(&b) ? 0 : b.clear_chance);
     return crt_is_fuzzy(&b) ? (1 - double{b.fuzz_chance}) * chance : chance;

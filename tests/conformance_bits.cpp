@@ -136,6 +136,8 @@ struct Case {
     bool coated = false;
     bool shaped = false;
     bool instanced = false;
+    bool varying = false;
+    bool tinted = false;
 };
 
 const char* const kPointLights = R"(lights:
@@ -421,6 +423,50 @@ void addCoats(crt::Scene& scene) {
     }
 }
 
+/// Gloss and coats whose roughness is in an image: gloss bare and under coats, metal under them, and a coat
+/// of its own roughness on gloss that varies.
+void addVaryingGloss(crt::Scene& scene) {
+    addUvs(scene);
+    crt::Texture rough;
+    rough.image = randomImage(9, 4, crt::TexelKind::Numbers);
+    scene.textures.push_back(rough);
+    const auto index = static_cast<crt::TextureIndex>(scene.textures.size() - 1);
+    int number = 0;
+    for (crt::Material& m : scene.materials) {
+        if (m.transmits()) continue;
+        if (m.type == crt::MaterialType::Diffuse) {
+            m.type = crt::MaterialType::Plastic;
+            m.eta = crt::constantSpectrum(1.375);
+        }
+        const bool gloss = m.type == crt::MaterialType::Plastic,
+                   metal = m.type == crt::MaterialType::RoughConductor;
+        if (gloss && number % 2 == 0) m.roughness_texture = index;
+        if (number++ % 3 == 0) continue;
+        crt::Clearcoat& coat = m.clearcoat.emplace();
+        coat.ior = 1.5;
+        coat.roughness = 0.25;
+        if (number % 2 == 0) coat.roughness_texture = index;
+        coat.depth = crt::constantSpectrum(0.25);
+        coat.base_share = 0.5;
+        coat.roughens = (gloss || metal) && (number % 2 == 0 || m.roughness_texture != crt::kNoTexture);
+    }
+}
+
+/// A tint on all that has one, of a table and of a texture in turn.
+void addTints(crt::Scene& scene) {
+    addUvs(scene);
+    crt::Texture colors;
+    colors.image = randomImage(4, 6, crt::TexelKind::Spectra);
+    scene.textures.push_back(colors);
+    const auto index = static_cast<crt::TextureIndex>(scene.textures.size() - 1);
+    for (crt::Material& m : scene.materials) {
+        if (&m - scene.materials.data() & 1)
+            m.tint = scene.materials[1].reflectance;
+        else
+            m.tint_texture = index;
+    }
+}
+
 /// Shapes of every kind, whole and in part, from outside and from inside, one material each; some shine.
 void addShapes(crt::Scene& scene) {
     const auto empty = static_cast<std::uint32_t>(scene.meshes.size());
@@ -516,8 +562,7 @@ const Case kCases[] = {
     {"{max_depth: 8}", "{type: sobol}", "", "box", true, kPointLights, false, false, false, false, true},
     {"{max_depth: 6, accelerator: bvh}", "{type: xorshift}", "", "box", true, "", true, false, true, false,
      true},
-    {"{max_depth: 12}", "{type: sobol}", "", "box", false, "", false, false, false, false, false,
-     true},
+    {"{max_depth: 12}", "{type: sobol}", "", "box", false, "", false, false, false, false, false, true},
     {"{max_depth: 12}", "{type: sobol}", "", "box", false, "", true, false, false, false, false, false,
      true},
     {"{max_depth: 6, accelerator: bvh}", "{type: independent}", "", "box", true, "", true, true, false,
@@ -534,24 +579,144 @@ const Case kCases[] = {
      false, false, false, false, false, false, true},
     {"{max_depth: 8}", "{type: sobol}", "", "box", true, kPointLights, true, false, false, false, false,
      false, false, false, false, false, false, false, true},
-    {"{max_depth: 8}", "{type: sobol}", "", "box", true, kPointLights, true, false, false, false, true,
-     false, false, false, false, false, false, false, false, true},
-    {"{max_depth: 8}", "{type: sobol}", "", "box", true, "", false, false, false, false, false, false, false,
-     false, false, false, false, false, false, false, true},
-    {"{max_depth: 6, accelerator: bvh}", "{type: independent}", "", "box", true, kPointLights, false, true,
-     false, true, false, false, false, false, false, true, false, false, false, false, true},
-    {"{max_depth: 5, accelerator: aabb}", "{type: xorshift}", "", "box", false, "", true, false, false,
-     false, true, false, false, false, false, false, false, false, false, false, true},
-    {.integrator = "{max_depth: 8}", .sampler = "{type: sobol}", .camera_extra = "", .filter = "box",
-     .sampled_environment = true, .glassware = true, .instanced = true},
-    {.integrator = "{max_depth: 6}", .sampler = "{type: independent}", .camera_extra = "", .filter = "box",
-     .more = kPointLights, .textured = true, .brushed = true, .shaped = true, .instanced = true},
-    {.integrator = "{max_depth: 6}", .sampler = "{type: xorshift}", .camera_extra = "", .filter = "box",
-     .composed = true, .mapped = true, .instanced = true},
-    {.integrator = "{type: splat_test}", .sampler = "{type: independent}", .camera_extra = "",
+    {"{max_depth: 8}",
+     "{type: sobol}",
+     "",
+     "box",
+     true,
+     kPointLights,
+     true,
+     false,
+     false,
+     false,
+     true,
+     false,
+     false,
+     false,
+     false,
+     false,
+     false,
+     false,
+     false,
+     true},
+    {"{max_depth: 8}",
+     "{type: sobol}",
+     "",
+     "box",
+     true,
+     "",
+     false,
+     false,
+     false,
+     false,
+     false,
+     false,
+     false,
+     false,
+     false,
+     false,
+     false,
+     false,
+     false,
+     false,
+     true},
+    {"{max_depth: 6, accelerator: bvh}",
+     "{type: independent}",
+     "",
+     "box",
+     true,
+     kPointLights,
+     false,
+     true,
+     false,
+     true,
+     false,
+     false,
+     false,
+     false,
+     false,
+     true,
+     false,
+     false,
+     false,
+     false,
+     true},
+    {"{max_depth: 5, accelerator: aabb}",
+     "{type: xorshift}",
+     "",
+     "box",
+     false,
+     "",
+     true,
+     false,
+     false,
+     false,
+     true,
+     false,
+     false,
+     false,
+     false,
+     false,
+     false,
+     false,
+     false,
+     false,
+     true},
+    {.integrator = "{max_depth: 8}",
+     .sampler = "{type: sobol}",
+     .camera_extra = "",
+     .filter = "box",
+     .sampled_environment = true,
+     .glassware = true,
+     .instanced = true},
+    {.integrator = "{max_depth: 6}",
+     .sampler = "{type: independent}",
+     .camera_extra = "",
+     .filter = "box",
+     .more = kPointLights,
+     .textured = true,
+     .brushed = true,
+     .shaped = true,
+     .instanced = true},
+    {.integrator = "{max_depth: 6}",
+     .sampler = "{type: xorshift}",
+     .camera_extra = "",
+     .filter = "box",
+     .composed = true,
+     .mapped = true,
+     .instanced = true},
+    {.integrator = "{type: splat_test}",
+     .sampler = "{type: independent}",
+     .camera_extra = "",
      .filter = "box"},
-    {.integrator = "{type: splat_test, accelerator: bvh}", .sampler = "{type: sobol, replicates: 8}",
-     .camera_extra = "", .filter = "box", .textured = true},
+    {.integrator = "{type: splat_test, accelerator: bvh}",
+     .sampler = "{type: sobol, replicates: 8}",
+     .camera_extra = "",
+     .filter = "box",
+     .textured = true},
+    {.integrator = "{max_depth: 8}",
+     .sampler = "{type: sobol}",
+     .camera_extra = "",
+     .filter = "box",
+     .varying = true,
+     .tinted = true},
+    {.integrator = "{max_depth: 6}",
+     .sampler = "{type: sobol}",
+     .camera_extra = "",
+     .filter = "box",
+     .more = kPointLights,
+     .glassware = true,
+     .films = true,
+     .tinted = true},
+    {.integrator = "{max_depth: 6, accelerator: bvh}",
+     .sampler = "{type: independent}",
+     .camera_extra = "",
+     .filter = "box",
+     .sampled_environment = true,
+     .more = kPointLights,
+     .shaped = true,
+     .instanced = true,
+     .varying = true},
 };
 
 /// A room that needs little of the kernel, so that the lean kernel is another than the full one also where
@@ -596,6 +761,8 @@ crt::Scene sceneOf(const Case& c) {
     if (c.rough_bases) addRoughBases(scene);
     if (c.fuzzy) addFuzz(scene);
     if (c.coated) addCoats(scene);
+    if (c.varying) addVaryingGloss(scene);
+    if (c.tinted) addTints(scene);
     if (c.instanced) addInstances(scene);
     return scene;
 }
@@ -640,7 +807,10 @@ std::vector<Named> conformance::allScenes() {
                                  "instances, shapes, textures, brushed, independent",
                                  "instances, mixes and holes, normal maps, xorshift",
                                  "splats",
-                                 "splats, eight replicates, tree, sobol"};
+                                 "splats, eight replicates, tree, sobol",
+                                 "gloss and coats of varying roughness, tints",
+                                 "tints, films, glassware, point lights",
+                                 "varying gloss, shapes, instances, tree, independent"};
     static_assert(std::size(names) == std::size(kCases));
     std::vector<Named> all;
     for (std::size_t i = 0; i < std::size(kCases); ++i) all.push_back({names[i], sceneOf(kCases[i])});

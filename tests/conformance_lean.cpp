@@ -83,11 +83,16 @@ const Removal kRemovals[] = {
      [](Scene& s) {
          forMaterials(s, [](auto& m) {
              m.roughness_texture = m.amount_texture = m.opacity_texture = m.film_texture = crt::kNoTexture;
+             m.tint_texture = crt::kNoTexture;
+             if (m.clearcoat) m.clearcoat->roughness_texture = crt::kNoTexture;
+             if (m.clearcoat) m.clearcoat->roughens = false;
              if (m.reflectance_texture == crt::kNoTexture) return;
              m.reflectance_texture = crt::kNoTexture;
              m.reflectance = crt::constantSpectrum(0.5);
          });
      }},
+    {"tints",
+     [](Scene& s) { forMaterials(s, [](auto& m) { m.tint.reset(), m.tint_texture = crt::kNoTexture; }); }},
     {"anisotropy", [](Scene& s) { forMaterials(s, [](auto& m) { m.anisotropy = 0; }); }},
     {"fuzz", [](Scene& s) { forMaterials(s, [](auto& m) { m.fuzz = 0; }); }},
     {"coats", [](Scene& s) { forMaterials(s, [](auto& m) { m.clearcoat.reset(); }); }},

@@ -326,3 +326,30 @@ TEST_CASE("coats: the table agrees with quadrature over the normals, and is not 
     CHECK(crt::coatOf(crt::coatsOf({&polished, nullptr}), polished).internal_reflectance ==
           Approx(0.5963457597).epsilon(1e-6));
 }
+
+// The tables of a roughness that depends on the place are those of CRT_COAT_ROUGHNESSES roughnesses.
+TEST_CASE("coats: between two tables the albedo is that of the roughness", "[kernel][bsdf][materials]") {
+    for (const double eta : {1.2, 1.5, 2.5}) {
+        Material rough = plastic(1, 0, eta);
+        rough.roughness_texture = 0;
+        const crt::VaryingCoat varying = crt::varyingCoatOf(crt::coatsOf({&rough}), eta);
+        REQUIRE(varying.albedos.size() == CRT_COAT_ROUGHNESSES);
+        std::vector<float> tables;
+        for (const crt::Spectrum& albedo : varying.albedos) {
+            for (const double v : albedo.values) tables.push_back(static_cast<float>(v));
+            tables.push_back(tables.back());
+        }
+        for (double roughness = 0.0317; roughness <= 1; roughness += 0.0137) {
+            const f32 place = crt_coat_place(static_cast<f32>(roughness));
+            const u32 first = std::min(static_cast<u32>(place), CRT_COAT_ROUGHNESSES - 2);
+            const CrtCoat coat{tables.data() + first * CRT_SPECTRUM_STRIDE, place - static_cast<f32>(first)};
+            for (const double cosine : {0.02, 0.05, 0.1, 0.2, 0.4, 0.7, 1.0}) {
+                INFO(eta << ", roughness " << roughness << " at " << cosine);
+                const f32 eta_single = static_cast<f32>(eta);
+                CHECK(std::abs(static_cast<double>(
+                                   crt_coat_reflects(coat, static_cast<f32>(cosine), eta_single)) -
+                               crt::coatAlbedo(cosine, eta, roughness * roughness)) < 3e-3);
+            }
+        }
+    }
+}

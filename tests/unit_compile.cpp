@@ -176,6 +176,30 @@ TEST_CASE("every feature bit is set by some scene, and by nothing else", "[compi
         coated(0, 1.5)(s);
         for (crt::Material& m : s.materials) m.type = crt::MaterialType::Mirror;
     });
+    const auto tinted = [&](crt::MaterialType type) {
+        return [=](Scene& s) {
+            other(type)(s);
+            s.materials[1].tint = crt::constantSpectrum(0.5);
+        };
+    };
+    seen |= differs(CRT_FEATURE_CONDUCTOR | CRT_FEATURE_TINT, 0, tinted(crt::MaterialType::Conductor));
+    differs(CRT_FEATURE_DIELECTRIC, 0, tinted(crt::MaterialType::Dielectric));  // which has none
+    // A texture of roughness needs tables of coats on gloss alone.
+    const auto by_place = [&](crt::MaterialType type) {
+        return [=](Scene& s) {
+            other(type)(s);
+            crt::Texture checker;
+            checker.kind = crt::Texture::Kind::Checker;
+            checker.values = {crt::TextureValue{crt::constantSpectrum(0.25), crt::kNoTexture},
+                              crt::TextureValue{crt::constantSpectrum(0.75), crt::kNoTexture}};
+            s.textures = {checker};
+            s.materials[1].roughness_texture = 0;
+        };
+    };
+    seen |= differs(CRT_FEATURE_PLASTIC | CRT_FEATURE_TABLE | CRT_FEATURE_TEXTURE | CRT_FEATURE_COAT_TEXTURE,
+                    0, by_place(crt::MaterialType::Plastic));
+    differs(CRT_FEATURE_ROUGH_CONDUCTOR | CRT_FEATURE_TEXTURE, 0,
+            by_place(crt::MaterialType::RoughConductor));
     // Transmitting materials have none.
     differs(CRT_FEATURE_DIELECTRIC, 0, [&](Scene& s) {
         other(crt::MaterialType::Dielectric)(s);

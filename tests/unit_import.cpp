@@ -81,31 +81,61 @@ TEST_CASE("Channels of a texture become numbers, with factor and threshold", "[g
     CHECK(importOf({{"pbrMetallicRoughness", color}}, texture).scene.materials[0].isOpaque());
 }
 
-// Fails when roughness is read from another channel than green, metalness from another than blue, or the
-// texture is used where crt refuses it.
-TEST_CASE("Metalness and roughness in one texture become a mix of a dielectric and a metal",
-          "[gltf][import]") {
+// Fails when roughness is read from another channel than green, or metalness from another than blue.
+TEST_CASE("Metalness and roughness in one texture become those of one material", "[gltf][import]") {
     const Json rough{
         {"name", "paint"},
         {"pbrMetallicRoughness", {{"metallicRoughnessTexture", {{"index", 0}}}, {"roughnessFactor", 0.5}}}};
     const Imported result = importOf(rough, [](GltfMaker& m) { m.texture(rgba(2, 2, kFourTexels)); });
     CHECK_THAT(result.text,
-               Contains("paint:\n    type: mix\n    materials: [\"paint (dielectric)\", \"paint "
-                        "(metal)\"]\n    amount: {texture: a.glb, image: 0, channel: blue}"));
-    const double mean = 0.5 * (0 + 128 + 200 + 60) / 4 / 255;
+               Contains("base_metalness: {texture: a.glb, image: 0, channel: blue}\n    "
+                        "specular_roughness: {texture: a.glb, image: 0, channel: green, factor: 0.5}\n"));
     const Scene& scene = result.scene;
-    const auto named = [&](const std::string& name) {
-        for (const Material& m : scene.materials)
-            if (m.name == name) return m;
-        FAIL(name);
-        return Material();
-    };
-    CHECK(named("paint (dielectric)").roughness == Approx(mean));
-    const TextureIndex metal = named("paint (metal)").roughness_texture;
-    REQUIRE(metal != kNoTexture);
-    CHECK(wordsOf(scene.textures[static_cast<std::size_t>(metal)])[2] ==
-          static_cast<std::uint16_t>(200 * 257 * 0.5 + 0.5));
-    CHECK_THAT(result.log, Contains("roughness: crt uses its mean"));
+    REQUIRE(scene.materials.size() == 3);
+    for (std::size_t i = 0; i < 2; ++i) {
+        const TextureIndex texture = scene.materials[i].roughness_texture;
+        REQUIRE(texture != kNoTexture);
+        CHECK(wordsOf(scene.textures[static_cast<std::size_t>(texture)])[2] ==
+              static_cast<std::uint16_t>(200 * 257 * 0.5 + 0.5));
+    }
+    CHECK_THAT(result.log, !Contains("roughness"));
+}
+
+// Fails when a pane keeps its glass clear, or a texture of specular colour is left out or not multiplied.
+TEST_CASE("Colours of thin glass and of specular reflections may be textures", "[gltf][import]") {
+    const auto texture = [](GltfMaker& m) { m.texture(rgba(2, 2, kFourTexels)); };
+    const Json stained{{"pbrMetallicRoughness",
+                        {{"baseColorTexture", {{"index", 0}}}, {"baseColorFactor", {1, 0.5, 0.5, 1}}}},
+                       {"extensions", {{"KHR_materials_transmission", {{"transmissionFactor", 1}}}}}};
+    const Imported glass = importOf(stained, texture);
+    CHECK_THAT(glass.text, Contains("tint: {texture: a.glb, image: 0, factor: [1, 0.5, 0.5]}\n"));
+    CHECK_THAT(glass.log, !Contains("tint"));
+    const Json silk{
+        {"pbrMetallicRoughness", {{"metallicFactor", 0.5}}},
+        {"extensions",
+         {{"KHR_materials_specular",
+           {{"specularColorFactor", {0.5, 0.25, 0.125}}, {"specularColorTexture", {{"index", 0}}}}}}}};
+    const Imported gloss = importOf(silk, texture);
+    // A metal reflects by its base colour: it is a separate material.
+    CHECK_THAT(gloss.text,
+               Contains("(dielectric)") &&
+                   Contains("specular_color: {texture: a.glb, image: 0, factor: [0.5, 0.25, 0.125]}"));
+    CHECK_THAT(gloss.log, !Contains("specular"));
+}
+
+// Fails when the roughness of a coat is read from another channel than green, or its factor is left out.
+TEST_CASE("The roughness of a clear coat may be a texture", "[gltf][import]") {
+    const Json coat{{"clearcoatFactor", 1},
+                    {"clearcoatRoughnessFactor", 0.5},
+                    {"clearcoatRoughnessTexture", {{"index", 0}}}};
+    const Imported result = importOf({{"pbrMetallicRoughness", {{"metallicFactor", 0}}},
+                                      {"extensions", {{"KHR_materials_clearcoat", coat}}}},
+                                     [](GltfMaker& m) { m.texture(rgba(2, 2, kFourTexels)); });
+    CHECK_THAT(result.text, Contains("coat_weight: 1\n    coat_roughness: {texture: a.glb, image: 0, "
+                                     "channel: green, factor: 0.5}\n"));
+    REQUIRE(result.scene.materials.size() == 1);
+    CHECK(result.scene.materials[0].clearcoat->roughness_texture != kNoTexture);
+    CHECK_THAT(result.log, !Contains("roughness"));
 }
 
 // Fails when the turn has the other sense, or v is turned up before the transform instead of behind it.
@@ -153,7 +183,15 @@ TEST_CASE("Extensions of materials become keys of OpenPBR", "[gltf][import]") {
     };
     CHECK_THAT(textOf("KHR_materials_ior", {{"ior", 1.7}}), Contains("specular_ior: 1.7\n"));
     CHECK_THAT(textOf("KHR_materials_specular", {{"specularFactor", 0.5}}),
-               Contains("specular_weight: 0.5\n"));
+               Contains("specular_weight: 0.5\n") && !Contains("specular_color"));
+    CHECK_THAT(textOf("KHR_materials_specular", {{"specularColorFactor", {0.5, 0.5, 0.5}}}),
+               Contains("specular_weight: 0.5\n") && !Contains("specular_color"));
+    CHECK_THAT(
+        textOf("KHR_materials_specular", {{"specularColorFactor", {1, 0.5, 0.25}}}),
+        Contains("specular_color: {rgb: [1, 0.5, 0.25], space: linear}\n") && !Contains("specular_weight"));
+    CHECK_THAT(textOf("KHR_materials_specular", {{"specularColorFactor", {4, 2, 1}}}),
+               Contains("specular_weight: 4\n") &&
+                   Contains("specular_color: {rgb: [1, 0.5, 0.25], space: linear}\n"));
     CHECK_THAT(
         textOf("KHR_materials_clearcoat", {{"clearcoatFactor", 0.75}, {"clearcoatRoughnessFactor", 0.1}}),
         Contains("coat_weight: 0.75\n    coat_roughness: 0.1\n    coat_ior: 1.5\n"));
@@ -162,7 +200,7 @@ TEST_CASE("Extensions of materials become keys of OpenPBR", "[gltf][import]") {
         Contains("fuzz_weight: 0.5\n    fuzz_color: {rgb: [1, 0.5, 0], space: linear}\n    "
                  "fuzz_roughness: 0.3\n"));
     CHECK_THAT(textOf("KHR_materials_transmission", {{"transmissionFactor", 0.5}}),
-               Contains("type: thin_dielectric") && Contains("amount: 0.5"));
+               Contains("type: thin_dielectric") && Contains("amount: 0.5") && !Contains("tint:"));
     const Json body{
         {"KHR_materials_volume",
          {{"thicknessFactor", 2}, {"attenuationDistance", 0.5}, {"attenuationColor", {1, 0.5, 0.25}}}}};

@@ -162,6 +162,7 @@ TEST_CASE("microfacets: where a texture leaves out a film the metal is bare", "[
     CrtBsdf b{};
     b.eta = splat4(2.7f);
     b.k = splat4(3.6f);
+    b.tint = splat4(1.0f);
     b.film_eta = splat4(2.4f);
     b.film_rounds = splat4(0.8f);
     const auto mean = [&] { return V4X(crt_metal_mean(&ctx, &b, &material, nullptr, splat4(0.0f))); };

@@ -154,9 +154,43 @@ TEST_CASE("openpbr's coat lies on each of its parts, which are others below it",
     const std::vector<Material> worn = materials("coat_weight: {checker: [0, 1]}");
     REQUIRE(worn.size() == 3);
     CHECK(worn[2].amount_texture != kNoTexture);
+    // Where a roughness depends on the place, each vertex adds that of the coat.
+    const Material metal_by_place = materials(
+        "coat_weight: 1, base_metalness: 1, coat_roughness: {checker: "
+        "[0, 1]}, specular_roughness: 0.25")[0];
+    CHECK(metal_by_place.clearcoat->roughness_texture != kNoTexture);
+    CHECK(metal_by_place.clearcoat->roughens);
+    CHECK(metal_by_place.roughness == 0.25);
+    CHECK(metal_by_place.hasVaryingRoughness());
+    const Material gloss_by_place = materials(
+        "coat_weight: 1, coat_roughness: 0.5, specular_roughness: "
+        "{checker: [0, 1]}")[0];
+    CHECK(gloss_by_place.type == MaterialType::Plastic);
+    CHECK(gloss_by_place.roughness_texture != kNoTexture);
+    CHECK(gloss_by_place.clearcoat->roughens);
+    CHECK(gloss_by_place.clearcoat->base_share == Approx(reflected));
+    CHECK_FALSE(materials("coat_weight: 1, specular_roughness: {checker: [0, 1]}")[0].clearcoat->roughens);
     // Of a coat that is not there keys say nothing.
     const Material bare = materials("coat_roughness: 1, coat_color: 0, coat_ior: 3")[0];
     CHECK_FALSE(bare.clearcoat);
     CHECK(bare.roughness == 0.3);
     CHECK(bare.eta[0] == Approx(1.5));
+}
+
+TEST_CASE("openpbr refuses a roughness by place where its tables have one roughness",
+          "[scene_yaml]") {
+    for (const auto& [keys, why, instead] :
+         {std::tuple{"coat_weight: 1, coat_roughness: {checker: [0, 1]}, base_metalness: 1, "
+                     "specular_roughness_anisotropy: 0.5",
+                     "a coat of uniform roughness", "give 'coat_roughness' a number"},
+          std::tuple{"coat_weight: 1, coat_roughness: {checker: [0, 1]}, base_diffuse_roughness: 0.5",
+                     "a gloss of uniform roughness", "leave 'base_diffuse_roughness' out"},
+          std::tuple{"coat_weight: 1, coat_roughness: {checker: [0, 1]}, coat_roughness_anisotropy: 0.5",
+                     "must be isotropic", "leave 'coat_roughness_anisotropy'"},
+          std::tuple{"specular_roughness: {checker: [0, 1]}, base_diffuse_roughness: 0.5",
+                     "a gloss of uniform roughness", "leave 'base_diffuse_roughness' out"}}) {
+        INFO(keys);
+        CHECK_THAT(refused(std::string("materials: {m: {type: openpbr, ") + keys + "}}\n"),
+                   Contains(why) && Contains(instead));
+    }
 }

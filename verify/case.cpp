@@ -73,14 +73,14 @@ const std::vector<Case>& registry() {
     static const std::vector<Case> cases = [] {
         std::vector<Case> all;
         for (const auto group :
-             {closedFormCases, glassCases,         scaleCases,         geometryCases,    rayCases,
-              lightCases,      pointLightCases,    lightTreeCases,     environmentCases, spectralFilmCases,
-              stiffCases,      scatteringCases,    roughSurfaceCases,  glasswareCases,   paneCases,
-              thinFilmCases,   anisotropyCases,    openPbrCases,       openPbrCoatCases, compositionCases,
-              bodyCases,       shadingNormalCases, quadricCases,       instanceCases,    shapeLightCases,
-              colourCases,     textureCases,       accumulationCases,  splatCases,       cameraCases,
-              firstHitCases,   imageCases,         backendCases,       exactRelationCases, mutantCases,
-              contactCases})
+             {closedFormCases, glassCases,         scaleCases,        geometryCases,      rayCases,
+              lightCases,      pointLightCases,    lightTreeCases,    environmentCases,   spectralFilmCases,
+              stiffCases,      scatteringCases,    roughSurfaceCases, glasswareCases,     paneCases,
+              thinFilmCases,   anisotropyCases,    openPbrCases,      openPbrCoatCases,   compositionCases,
+              bodyCases,       shadingNormalCases, quadricCases,      instanceCases,      shapeLightCases,
+              colourCases,     textureCases,       accumulationCases, splatCases,         cameraCases,
+              firstHitCases,   imageCases,         backendCases,      exactRelationCases, mutantCases,
+              contactCases,    roughByPlaceCases,  tintCases})
             for (Case& c : group()) all.push_back(std::move(c));
         std::sort(all.begin(), all.end(), [](const Case& a, const Case& b) { return a.id < b.id; });
         return all;

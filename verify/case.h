@@ -109,6 +109,8 @@ std::vector<Case> thinFilmCases();       ///< G, thin films
 std::vector<Case> anisotropyCases();     ///< G, brushed surfaces
 std::vector<Case> openPbrCases();        ///< G, openpbr
 std::vector<Case> openPbrCoatCases();    ///< G, coats
+std::vector<Case> tintCases();           ///< G, colours of mirrors, gloss and panes
+std::vector<Case> roughByPlaceCases();   ///< G, gloss and coats whose roughness depends on the place
 std::vector<Case> instanceCases();       ///< D, meshes that are stored once and placed many times
 std::vector<Case> quadricCases();        ///< D and G, spheres, disks and cylinders
 std::vector<Case> shapeLightCases();     ///< G, lamps that are such

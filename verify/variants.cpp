@@ -121,6 +121,24 @@ std::vector<Variant> variants(int resolution) {
             if (!material.transmits())
                 material.clearcoat = Clearcoat{.ior = 1.5, .roughness = 0.3, .depth = constantSpectrum(0.2)};
     });
+    add("gloss and coats of varying roughness, tints", [](Scene& s) {
+        Texture checker;
+        checker.kind = Texture::Kind::Checker;
+        checker.values = {TextureValue{constantSpectrum(0.2), kNoTexture},
+                          TextureValue{constantSpectrum(0.6), kNoTexture}};
+        s.textures = {checker};
+        for (Material& material : s.materials) {
+            material.tint = constantSpectrum(0.8);
+            if (material.type == MaterialType::Diffuse) {
+                material.type = MaterialType::Plastic;
+                material.eta = constantSpectrum(1.4);
+                material.roughness_texture = 0;
+            } else if (material.type == MaterialType::Conductor) {
+                material.clearcoat =
+                    Clearcoat{.ior = 1.5, .roughness_texture = 0, .depth = constantSpectrum(0.1)};
+            }
+        }
+    });
     add("rough diffuse bases", [](Scene& s) {
         for (Material& material : s.materials)
             if (material.type == MaterialType::Diffuse) {

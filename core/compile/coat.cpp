@@ -47,6 +47,16 @@ void finish(const CoatKey& key, Coat& coat) {
 CoatKey coatKeyOf(const Material& plastic) { return {plastic.eta[0], plastic.roughness}; }
 CoatKey coatKeyOf(const Clearcoat& coat) { return {coat.ior, coat.roughness}; }
 
+/// The keys of a coat whose roughness depends on the place.
+std::vector<CoatKey> varyingKeys(double ior) {
+    std::vector<CoatKey> keys;
+    for (unsigned i = 0; i < CRT_COAT_ROUGHNESSES; ++i) {
+        const double root = static_cast<double>(i) / (CRT_COAT_ROUGHNESSES - 1);
+        keys.emplace_back(ior, root * root);
+    }
+    return keys;
+}
+
 }  // namespace
 
 CRT_FOR_AVX2_TOO double coatAlbedo(double cosine, double eta, double alpha) {
@@ -60,14 +70,37 @@ const Coat& coatOf(const Coats& coats, const Material& plastic) { return coats.a
 
 const Coat& coatOf(const Coats& coats, const Clearcoat& clearcoat) { return coats.at(coatKeyOf(clearcoat)); }
 
+VaryingCoat varyingCoatOf(const Coats& coats, double ior) {
+    VaryingCoat varying;
+    const auto cosineAt = [](std::size_t i) { return static_cast<double>(i) / kCoatCells; };
+    for (const CoatKey& key : varyingKeys(ior)) {
+        const Coat& coat = coats.at(key);
+        Spectrum& albedo = varying.albedos.emplace_back(coat.albedo);
+        if (isSmooth(key))
+            for (std::size_t i = 0; i < kSpectrumSize; ++i)
+                albedo[i] = dielectricReflectance(cosineAt(i), ior);
+        varying.internal_reflectance[varying.albedos.size() - 1] = coat.internal_reflectance;
+    }
+    for (std::size_t i = varying.albedos.size(); i < kSpectrumSize; ++i)
+        varying.internal_reflectance[i] = varying.internal_reflectance[i - 1];
+    return varying;
+}
+
 namespace {
 
 /// Calls add(key, material) for each coat among the materials, equal ones as often as they are there.
 template <class Add>
 void forCoats(const std::vector<const Material*>& materials, const Add& add) {
+    const auto addAll = [&](const Material& material, bool varies, const CoatKey& key) {
+        if (!varies) return add(key, material);
+        for (const CoatKey& one : varyingKeys(key.first)) add(one, material);
+    };
     for (const Material* material : materials) {
-        if (material && material->type == MaterialType::Plastic) add(coatKeyOf(*material), *material);
-        if (material && hasClearcoat(*material)) add(coatKeyOf(*material->clearcoat), *material);
+        if (material && material->type == MaterialType::Plastic)
+            addAll(*material, material->hasVaryingRoughness(), coatKeyOf(*material));
+        if (material && hasClearcoat(*material))
+            addAll(*material, material->clearcoat->roughness_texture != kNoTexture,
+                   coatKeyOf(*material->clearcoat));
     }
 }
 
@@ -91,7 +124,7 @@ std::vector<SpectrumValues::Array> makeAlbedos(const std::vector<CoatKey>& keys)
 
 /// As with the tables of losses (loss_table.h).
 Memo<CoatKey, SpectrumValues::Array>& keptAlbedos() {
-    static Memo<CoatKey, SpectrumValues::Array> kept(128);
+    static Memo<CoatKey, SpectrumValues::Array> kept(256);
     return kept;
 }
 

@@ -20,11 +20,18 @@ struct Coat {
     double internal_reflectance = 0;
 };
 
-/// By index and roughness.
+/// By index and roughness. Where the roughness depends on the place, those of CRT_COAT_ROUGHNESSES.
 using Coats = std::map<std::pair<double, double>, Coat>;
 
 const Coat& coatOf(const Coats& coats, const Material& plastic);
 const Coat& coatOf(const Coats& coats, const Clearcoat& clearcoat);
+
+/// The tables of a coat whose roughness depends on the place (coat_table.h of the kernel).
+struct VaryingCoat {
+    std::vector<Spectrum> albedos;  ///< By roughness; of smooth coats Fresnel's equations.
+    Spectrum internal_reflectance;  ///< By roughness, at the first places; then the last one again.
+};
+VaryingCoat varyingCoatOf(const Coats& coats, double ior);
 
 /// True if it has a coat itself; of a composed material, the parts have the coat.
 inline bool hasClearcoat(const Material& material) {

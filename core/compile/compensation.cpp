@@ -30,7 +30,7 @@ LossKey tableKeyOf(const Material& material) {
     LossKey key{};
     key.refracts = material.type == MaterialType::RoughDielectric;
     if (key.refracts) std::tie(key.least, key.most) = std::pair(material.eta.min(), material.eta.max());
-    key.textured = material.roughness_texture != kNoTexture;
+    key.textured = material.hasVaryingRoughness();
     if (!key.textured) key.roughness = material.roughness;
     if (const Anisotropy a = anisotropyOf(material); a.narrowing > 0) {
         key.narrowing = a.narrowing;
@@ -137,7 +137,7 @@ bool hasMeanReflectance(const Material& material) {
 bool hasTable(const Material& material) {
     return (material.type == MaterialType::RoughConductor ||
             material.type == MaterialType::RoughDielectric) &&
-           (material.roughness_texture != kNoTexture || !isSmooth(material.roughness));
+           (material.hasVaryingRoughness() || !isSmooth(material.roughness));
 }
 
 /// A film changes a table of glass.

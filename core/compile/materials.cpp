@@ -29,9 +29,28 @@ const Material& fallbackMaterial() {
 /// For a composed material, its parts carry the fuzz.
 bool hasFuzz(const Material& material) { return material.fuzz > 0 && !material.isComposed(); }
 
+/// True if a gloss or a coat of it has a roughness that depends on the place.
+bool hasVaryingCoat(const Material& material) {
+    return (material.type == MaterialType::Plastic && material.hasVaryingRoughness()) ||
+           (hasClearcoat(material) &&
+            (material.clearcoat->roughness_texture != kNoTexture || material.clearcoat->roughens));
+}
+
 /// True if the scene has the material of a triangle.
 bool isKnown(const FlatTriangle& triangle, std::size_t scene_materials) {
     return triangle.material >= 0 && static_cast<std::size_t>(triangle.material) < scene_materials;
+}
+
+struct CoatValues {
+    kernel::CrtValue internal, albedo;
+};
+
+CoatValues coatValuesOf(const Coat& coat, SpectrumTable& spectra) {
+    return {valueOf(coat.internal_reflectance), spectra.valueOf(coat.albedo)};
+}
+
+CoatValues coatValuesOf(const VaryingCoat& coat, SpectrumTable& spectra) {
+    return {spectra.valueOf(std::vector{coat.internal_reflectance}), spectra.valueOf(coat.albedos)};
 }
 
 kernel::CrtMaterial recordOf(const Material& material, const MaterialTables& tables,
@@ -47,6 +66,8 @@ kernel::CrtMaterial recordOf(const Material& material, const MaterialTables& tab
     kernel::CrtMaterial record{};
     record.type = static_cast<std::uint32_t>(material.type);
     if (material.transmits()) record.flags = CRT_MATERIAL_TRANSMITS;
+    if (hasClearcoat(material) && material.clearcoat->roughens) record.flags |= CRT_MATERIAL_UNDER_COAT;
+    if (material.isTinted()) record.flags |= CRT_MATERIAL_TINTED;
     const auto losses = tables.compensations.table_of.find(&material);
     if (losses != tables.compensations.table_of.end()) record.loss = losses->second;
     if (const Anisotropy a = anisotropyOf(material); a.narrowing > 0) {
@@ -85,12 +106,14 @@ kernel::CrtMaterial recordOf(const Material& material, const MaterialTables& tab
         case MaterialType::Mix:
         case MaterialType::TwoSided: return {};
         case MaterialType::Plastic: {
-            const Coat& coat = coatOf(tables.coats, material);
             record.of.plastic.reflectance = reflectance();
             record.of.plastic.eta = spectra.valueOf(material.eta);
-            record.roughness = valueOf(material.roughness);
-            record.of.plastic.internal = valueOf(coat.internal_reflectance);
-            record.of.plastic.coat = spectra.valueOf(coat.albedo);
+            record.roughness = roughness();
+            const CoatValues coat = material.hasVaryingRoughness()
+                                        ? coatValuesOf(varyingCoatOf(tables.coats, material.eta[0]), spectra)
+                                        : coatValuesOf(coatOf(tables.coats, material), spectra);
+            record.of.plastic.internal = coat.internal;
+            record.of.plastic.coat = coat.albedo;
             if (material.by_color) record.flags |= CRT_MATERIAL_OPENPBR;
             break;
         }
@@ -114,17 +137,23 @@ kernel::CrtLayers layersOf(const Material& material, const MaterialTables& table
     }
     if (hasClearcoat(material)) {
         const Clearcoat& coat = *material.clearcoat;
-        const Coat& table = coatOf(tables.coats, coat);
+        const bool varies = coat.roughness_texture != kNoTexture,
+                   base_varies = material.roughness_texture != kNoTexture;
         record.clear_ior = static_cast<float>(coat.ior);
-        record.clear_roughness = static_cast<float>(coat.roughness);
+        record.clear_roughness = varies ? textures.valueOf(coat.roughness_texture) : valueOf(coat.roughness);
         record.clear_depth = spectra.valueOf(coat.depth);
-        record.clear_albedo = spectra.valueOf(table.albedo);
-        record.clear_internal = static_cast<float>(table.internal_reflectance);
+        const CoatValues values = varies ? coatValuesOf(varyingCoatOf(tables.coats, coat.ior), spectra)
+                                         : coatValuesOf(coatOf(tables.coats, coat), spectra);
+        record.clear_albedo = values.albedo;
+        record.clear_internal = values.internal;
         record.clear_darkening = static_cast<float>(coat.darkening);
-        record.clear_base = material.roughness_texture != kNoTexture
-                                ? textures.valueOf(material.roughness_texture)
-                                : valueOf(coat.base_roughness);
+        record.clear_base =
+            base_varies ? textures.valueOf(material.roughness_texture) : valueOf(coat.base_roughness);
+        record.clear_base_share = base_varies ? static_cast<float>(coat.base_share) : 1;
     }
+    if (material.isTinted())
+        record.tint = material.tint_texture != kNoTexture ? textures.valueOf(material.tint_texture)
+                                                          : spectra.valueOf(*material.tint);
     if (hasRoughBase(material)) {
         const RoughBase& base = tables.rough_bases.at(&material);
         record.base_loss = spectra.valueOf(base.loss);
@@ -237,7 +266,8 @@ MaterialPart compileMaterials(const std::vector<const Material*>& materials, con
         if (!material) continue;
         record = recordOf(*material, tables, spectra, textures);
         layers = layersOf(*material, tables, spectra, textures);
-        has_layers |= hasFuzz(*material) || hasClearcoat(*material) || hasRoughBase(*material);
+        has_layers |=
+            hasFuzz(*material) || hasClearcoat(*material) || hasRoughBase(*material) || material->isTinted();
         if (!material->isOpaque()) part.features |= CRT_FEATURE_OPACITY;
         if (material->normal_texture != kNoTexture) part.features |= CRT_FEATURE_NORMAL_MAP;
         if (material->isComposed()) {
@@ -250,6 +280,8 @@ MaterialPart compileMaterials(const std::vector<const Material*>& materials, con
         if (record.narrowing > 0) part.features |= CRT_FEATURE_ANISOTROPY;
         if (hasFuzz(*material)) part.features |= CRT_FEATURE_FUZZ;
         if (hasClearcoat(*material)) part.features |= CRT_FEATURE_CLEARCOAT;
+        if (material->isTinted()) part.features |= CRT_FEATURE_TINT;
+        if (hasVaryingCoat(*material)) part.features |= CRT_FEATURE_COAT_TEXTURE;
         if (hasRoughBase(*material)) part.features |= CRT_FEATURE_ROUGH_BASE;
     }
     if (!has_layers) part.layers.clear();

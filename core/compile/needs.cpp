@@ -104,6 +104,10 @@ LeftOut leftOut(const Scene& scene, const kernel::CrtScene& header, std::size_t 
     if (!has(CRT_FEATURE_OPACITY)) left_out("surfaces that rays may pass", "all materials are opaque");
     if (!has(CRT_FEATURE_NORMAL_MAP)) left_out("normal maps", "no material has one");
     if (!has(CRT_FEATURE_THIN_FILM)) left_out("thin films", "no surface has one");
+    if (!has(CRT_FEATURE_COAT_TEXTURE))
+        left_out("gloss of varying roughness",
+                 "the roughness of gloss and of coats does not depend on the place");
+    if (!has(CRT_FEATURE_TINT)) left_out("tints", "what is mirrored has the colours of Fresnel's equations");
     if (!has(CRT_FEATURE_CLEARCOAT)) left_out("coats", "no surface has one on top");
     if (!has(CRT_FEATURE_FUZZ)) left_out("fuzz", "no surface has any");
     if (!has(CRT_FEATURE_ROUGH_BASE)) left_out("rough diffuse bases", "all are Lambert's");

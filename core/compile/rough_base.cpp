@@ -1,7 +1,10 @@
 #include "compile/rough_base.h"
 
+#include "base/error.h"
 #include "base/parallel.h"
 #include "compile/reflectance.h"
+
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
@@ -78,9 +81,17 @@ std::array<double, 3> keyOf(const Material& plastic) {
 void countRoughBases(const std::vector<const Material*>& materials, TableWork& work) {
     constexpr double kSteps = 4 * 32 * kSpectrumSize;
     std::set<std::array<double, 3>> known;
-    for (const Material* material : materials)
-        if (material && hasRoughBase(*material) && known.insert(keyOf(*material)).second)
-            work.add(kSteps, *material);
+    for (const Material* material : materials) {
+        if (!material || !hasRoughBase(*material)) continue;
+        if (material->hasVaryingRoughness())
+            throw Error(
+                ErrorKind::Scene,
+                fmt::format("material '{}': a rough diffuse base needs a gloss of uniform roughness, "
+                            "because what it loses is tabulated",
+                            material->name),
+                material->place);
+        if (known.insert(keyOf(*material)).second) work.add(kSteps, *material);
+    }
 }
 
 RoughBases roughBasesOf(const std::vector<const Material*>& materials, const Coats& coats) {

@@ -27,11 +27,22 @@ kernel::CrtValue valueOf(double number) {
 kernel::CrtValue SpectrumTable::valueOf(const Spectrum& spectrum) {
     if (spectrum.isConstant()) return crt::valueOf(spectrum[0]);
     const auto [place, fresh] = index_.try_emplace(spectrum.values, count());
-    if (fresh) {
-        for (const double v : spectrum.values) floats_.push_back(static_cast<float>(v));
-        floats_.push_back(floats_.back());
-    }
+    if (fresh) append(spectrum.values);
     return CRT_VALUE_TABLE | place->second;
+}
+
+kernel::CrtValue SpectrumTable::valueOf(const std::vector<Spectrum>& tables) {
+    std::vector<SpectrumValues> values;
+    for (const Spectrum& table : tables) values.push_back(table.values);
+    const auto [place, fresh] = sequences_.try_emplace(values, count());
+    if (fresh)
+        for (const SpectrumValues& table : values) append(table);
+    return CRT_VALUE_TABLE | place->second;
+}
+
+void SpectrumTable::append(const SpectrumValues& values) {
+    for (const double v : values) floats_.push_back(static_cast<float>(v));
+    floats_.push_back(floats_.back());
 }
 
 }  // namespace crt

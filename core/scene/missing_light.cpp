@@ -19,7 +19,11 @@ struct SingleDirections {
 constexpr double kSmooth = 0.0316;
 
 bool isSmooth(const Material& material) {
-    return material.roughness_texture == kNoTexture && material.roughness < kSmooth;
+    return !material.hasVaryingRoughness() && material.roughness < kSmooth;
+}
+
+bool isSmooth(const Clearcoat& coat) {
+    return coat.roughness_texture == kNoTexture && coat.roughness < kSmooth;
 }
 
 void note(const Scene& scene, std::int32_t index, SingleDirections& found) {
@@ -42,7 +46,7 @@ void note(const Scene& scene, std::int32_t index, SingleDirections& found) {
             break;
         default: (scattersLobe(material.type) ? found.scatters : found.metal) = true;
     }
-    if (material.clearcoat) (material.clearcoat->roughness < kSmooth ? found.coats : found.scatters) = true;
+    if (material.clearcoat) (isSmooth(*material.clearcoat) ? found.coats : found.scatters) = true;
 }
 
 SingleDirections singleDirectionsOf(const Scene& scene) {

@@ -180,6 +180,40 @@ def test_materials_become_those_of_crt(tmp_path):
     near(top["specular_ior"], 1.5, 1e-9)
 
 
+def test_factors_on_what_is_mirrored_are_tints(tmp_path):
+    factor = '<spectrum name="specular_{}" value="0.25"/>'
+    gold = '<string name="material" value="Au"/>'
+    for kind, name, more in (("conductor", "reflectance", gold), ("roughconductor", "reflectance", gold),
+                             ("plastic", "reflectance", ""), ("roughplastic", "reflectance", ""),
+                             ("thindielectric", "transmittance", "")):
+        made, _ = bsdf(tmp_path, f'<bsdf type="{kind}">{factor.format(name)}{more}</bsdf>')
+        assert [m["tint"] for m in made.values() if "tint" in m] == [0.25], kind
+        made, _ = bsdf(tmp_path, f'<bsdf type="{kind}">{more}</bsdf>')
+        assert not any("tint" in m for m in made.values()), kind
+    write_png(tmp_path / "t.png", np.uint8([[[0] * 3, [255] * 3]]))
+    made, _ = bsdf(tmp_path, f'<bsdf type="roughconductor">{gold}<texture name="specular_reflectance" '
+                   'type="bitmap"><string name="filename" value="t.png"/></texture></bsdf>')
+    assert [m["tint"]["texture"] for m in made.values() if "tint" in m] == [tmp_path / "t.png"]
+
+
+def test_images_of_roughness_become_crts(tmp_path):
+    """crt's roughness is the root of Mitsuba's width; that of `principled` is crt's."""
+    write_png(tmp_path / "t.png", np.uint8([[[255] * 3, [64] * 3]]))
+
+    def image(name):
+        return f'<texture name="{name}" type="bitmap"><string name="filename" value="t.png"/><boolean ' \
+               'name="raw" value="true"/></texture>'
+    for names in (["alpha"], ["alpha_u", "alpha_v"]):
+        made, _ = bsdf(tmp_path, '<bsdf type="roughconductor"><string name="material" value="Au"/>'
+                       + "".join(map(image, names)) + "</bsdf>")
+        (rough,) = [m["roughness"] for m in made.values() if "roughness" in m]
+        assert np.allclose(rough["texture"], [[1, (64 / 255)**0.5]], atol=1e-3)
+    made, _ = bsdf(tmp_path, f'<bsdf type="principled">{image("roughness")}<float name="clearcoat" '
+                   'value="1"/></bsdf>')
+    (rough,) = [m["specular_roughness"] for m in made.values() if "specular_roughness" in m]
+    assert "texture" in rough
+
+
 def test_two_shapes_have_one_material_with_an_array(tmp_path):
     write_png(tmp_path / "t.png", np.uint8([[[0] * 3, [187] * 3]]))
     path = scene(tmp_path, '<bsdf type="mask" id="holes"><texture name="opacity" type="bitmap"><string '

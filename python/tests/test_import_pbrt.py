@@ -358,6 +358,9 @@ def test_images_of_roughness_become_crts(tmp_path):
     made = material(tmp_path, 'Texture "t" "float" "imagemap" "string filename" "t.pfm"\n'
                     'Material "conductor" "texture roughness" "t"')
     assert np.allclose(made["roughness"]["texture"], [[0.5, 1]])
+    made = material(tmp_path, 'Texture "t" "float" "imagemap" "string filename" "t.pfm"\n'
+                    'Material "coateddiffuse" "texture roughness" "t"')
+    assert np.allclose(made["roughness"]["texture"], [[0.5, 1]])
 
 
 def test_numbers_in_encoded_images_are_decoded(tmp_path):

@@ -70,7 +70,9 @@
     F(39, FUZZ, "fuzz on top of surfaces")                                                   \
     F(40, CLEARCOAT, "coats on top of surfaces")                                             \
     F(41, SHAPES, "spheres, disks and cylinders")                                            \
-    F(42, SPLAT, "splats: samples that add to other pixels than their own")
+    F(42, SPLAT, "splats: samples that add to other pixels than their own")                  \
+    F(43, COAT_TEXTURE, "gloss and coats whose roughness depends on the place")              \
+    F(44, TINT, "colours of mirrors, gloss and panes beside those of Fresnel's equations")
 
 #define CRT_FEATURE_NUMBER(bit, name, text) CRT_BIT_##name = bit,
 enum CrtFeatureNumber { CRT_FEATURE_LIST(CRT_FEATURE_NUMBER) };

@@ -220,9 +220,14 @@ CRT_ASSERT_SIZE(CrtTexture, 64);
 #define CRT_MATERIAL_DISPERSIVE 1u
 #define CRT_MATERIAL_TRANSMITS 2u /* light comes out on the other side */
 #define CRT_MATERIAL_OPENPBR 4u /* rough conductors and plastic: by the colours that are seen (openpbr.h) */
+#define CRT_MATERIAL_UNDER_COAT 8u /* its roughness grows by that of the coat, vertex by vertex */
+#define CRT_MATERIAL_TINTED 16u    /* it has a tint (tint.h) */
 
 /* Steps between the cosines 0 and 1 of a coat's table, which is as long as a spectrum's. */
 #define CRT_COAT_STEPS 470.0f
+/* The number of tables, one behind the other, of a coat whose roughness depends on the place. The square
+   roots of their roughnesses are evenly spaced from 0 to 1. */
+#define CRT_COAT_ROUGHNESSES 33u
 
 /* The share of light towards a view that microfacets lose, at steps of the root of its cosine. Behind the
    value of cosine 1, which comes twice, are the mean over the cosine and the share of diffuse light that
@@ -266,8 +271,10 @@ typedef struct CrtMaterial {
         struct {
             CrtValue reflectance;
             CrtValue eta;
-            CrtValue internal; /* share that the coat sends back from below */
-            CrtValue coat;     /* share that a rough coat reflects, by the cosine: a table; 0: smooth */
+            CrtValue internal; /* share that the coat sends back from below: a number; or, where the
+                                  roughness depends on the place, a table by CRT_COAT_ROUGHNESSES */
+            CrtValue coat;     /* share that a rough coat reflects, by the cosine: a table, or the first of
+                                  CRT_COAT_ROUGHNESSES; 0: smooth */
         } plastic;
     } of; /* by its type */
     CrtValue roughness; /* square root of the width α of GGX */
@@ -313,13 +320,14 @@ typedef struct CrtLayers {
     f32 fuzz_roughness;
     CrtValue fuzz_color;
     f32 clear_ior;          /* coat: its index; 0: there is none; otherwise: */
-    f32 clear_roughness;
-    CrtValue clear_albedo;  /* a table of what it mirrors by the cosine; 0: it is smooth */
+    CrtValue clear_roughness;
+    CrtValue clear_albedo;  /* what it mirrors by the cosine, as `coat` of plastic; 0: it is smooth */
     CrtValue clear_depth;   /* what is left of light that crosses it straight on is exp(−depth) */
-    f32 clear_internal;     /* share of diffuse light from below that it sends back */
+    CrtValue clear_internal; /* share of diffuse light from below that it sends back, as of plastic */
     f32 clear_darkening;    /* how much of what is lost by that is lost */
-    CrtValue clear_base;    /* how rough what lies below is, to that end */
-    u32 reserved[2];
+    CrtValue clear_base;    /* how rough what lies below is, to that end: this times */
+    f32 clear_base_share;   /* this, and the rest as rough as can be */
+    CrtValue tint;          /* of what is CRT_MATERIAL_TINTED */
 } CrtLayers;
 CRT_ASSERT_SIZE(CrtLayers, 64);
 

@@ -21,6 +21,20 @@ CRT_FN u32 crt_material_type(u32 type) {
     return type;
 }
 
+/* The roughness of a material. Light passes a rough coat twice, in and out: what lies below looks rougher
+   (OpenPBR Surface 1.1, "Coat"). Where one of the two roughnesses depends on the place, that is added here.
+ */
+CRT_FN f32 crt_own_roughness(const CrtContext *ctx, const CrtMaterial *material, const CrtSurface *surface,
+                             vec4 position) {
+    const f32 own = V4X(crt_value(ctx, material->roughness, surface, position));
+    if (!CRT_HAS(COAT_TEXTURE) || (material->flags & CRT_MATERIAL_UNDER_COAT) == 0u) return own;
+    CRT_GLOBAL const CrtLayers *layers =
+        CRT_ARRAY(CrtLayers, ctx->blob, ctx->scene->layers) + surface->material;
+    const f32 coat = V4X(crt_value(ctx, layers->clear_roughness, surface, position));
+    const f32 width = own * own, coat_width = coat * coat;
+    return crt_min(crt_sqrt(crt_sqrt(width * width + 2.0f * (coat_width * coat_width))), 1.0f);
+}
+
 /* Prepares the BSDF of the material of `surface`, for light that leaves along wo. `carried`: the path's
    throughput, which weights the choice between wavelengths. `albedo`: also computes the albedo, which the
    first vertex needs. */
@@ -58,6 +72,8 @@ CRT_FN void crt_bsdf_prepare(const CrtContext *ctx, CrtBsdf *b, const CrtSurface
                 b->eta = crt_value(ctx, material.of.metal.eta, surface, position);
                 b->k = crt_value(ctx, material.of.metal.k, surface, position);
                 b->flags = CRT_BSDF_REFLECTS | CRT_BSDF_DELTA;
+                if (CRT_HAS(TINT))
+                    b->tint = crt_tint(ctx, material.flags, surface->material, surface, position);
                 if (CRT_HAS(THIN_FILM)) crt_prepare_film(ctx, b, &material, surface, position, splat4(1.0f));
                 b->reflectance = crt_metal_reflectance(b, crt_min(dot3(wo, b->ns), 1.0f));
                 if (albedo) b->albedo = crt_metal_reflectance(b, 1.0f);
@@ -65,12 +81,14 @@ CRT_FN void crt_bsdf_prepare(const CrtContext *ctx, CrtBsdf *b, const CrtSurface
             break;
         case CRT_MATERIAL_ROUGH_CONDUCTOR:
             if (CRT_HAS(ROUGH_CONDUCTOR)) {
-                const f32 roughness = V4X(crt_value(ctx, material.roughness, surface, position));
+                const f32 roughness = crt_own_roughness(ctx, &material, surface, position);
                 b->flags = CRT_BSDF_REFLECTS;
                 b->eta = crt_value(ctx, material.of.metal.eta, surface, position);
                 b->k = crt_value(ctx, material.of.metal.k, surface, position);
                 b->alpha = roughness * roughness;
                 if (CRT_HAS(ANISOTROPY)) crt_prepare_anisotropy(ctx, b, &material, surface, outside);
+                if (CRT_HAS(TINT))
+                    b->tint = crt_tint(ctx, material.flags, surface->material, surface, position);
                 if ((material.flags & CRT_MATERIAL_OPENPBR) != 0u)
                     crt_prepare_colors(b, V4X(crt_value(ctx, material.of.metal.factor, surface, position)));
                 if (CRT_HAS(THIN_FILM)) crt_prepare_film(ctx, b, &material, surface, position, splat4(1.0f));
@@ -132,16 +150,13 @@ CRT_FN void crt_bsdf_prepare(const CrtContext *ctx, CrtBsdf *b, const CrtSurface
         case CRT_MATERIAL_PLASTIC:
             if (CRT_HAS(PLASTIC)) {
                 const vec4 base = crt_value(ctx, material.of.plastic.reflectance, surface, position);
-                const f32 roughness = V4X(crt_value(ctx, material.roughness, surface, position));
+                const f32 roughness = crt_own_roughness(ctx, &material, surface, position);
                 const f32 eta = V4X(crt_value(ctx, material.of.plastic.eta, surface, position));
-                const f32 k = V4X(crt_value(ctx, material.of.plastic.internal, surface, position));
+                const f32 k = crt_coat_returns(ctx, material.of.plastic.internal, roughness);
                 b->flags = CRT_BSDF_REFLECTS | CRT_BSDF_CHOOSES | CRT_BSDF_RAISES;
                 b->eta = splat4(eta);
                 b->alpha = roughness * roughness;
-                b->coat = 0;
-                if (CRT_HAS(TABLE) && (material.of.plastic.coat & CRT_VALUE_REFERENCE) != 0u)
-                    b->coat = CRT_ARRAY(f32, ctx->blob, ctx->scene->spectra) +
-                              (material.of.plastic.coat & CRT_VALUE_INDEX) * CRT_SPECTRUM_STRIDE;
+                b->coat = crt_coat(ctx, material.of.plastic.coat, material.of.plastic.internal, roughness);
                 /* The share of entering light that the base sends back through the coat. */
                 vec4 returned = base * (1.0f - k) / (splat4(1.0f) - base * k);
                 if ((material.flags & CRT_MATERIAL_OPENPBR) != 0u) returned = base;
@@ -151,10 +166,15 @@ CRT_FN void crt_bsdf_prepare(const CrtContext *ctx, CrtBsdf *b, const CrtSurface
                 if (CRT_HAS(ROUGH_BASE))
                     returned = crt_prepare_rough_base(ctx, b, surface->material, returned,
                                                       (1.0f - k) * eta * eta);
-                b->coat_chance = mirrored > 0.0f ? mirrored / (mirrored + scattered) : 0.0f;
+                f32 seen = mirrored;
+                if (CRT_HAS(TINT)) {
+                    b->tint = crt_tint(ctx, material.flags, surface->material, surface, position);
+                    seen = mirrored * (0.25f * sum4(b->tint));
+                }
+                b->coat_chance = seen > 0.0f ? seen / (seen + scattered) : 0.0f;
                 if (albedo) {
                     const f32 facing = crt_coat_albedo(b, 1.0f);
-                    b->albedo = splat4(facing) + returned * (1.0f - facing);
+                    b->albedo = crt_tinted(b, splat4(facing)) + returned * (1.0f - facing);
                 }
             }
             break;

@@ -16,6 +16,7 @@
 #ifndef CRT_CLEARCOAT_H
 #define CRT_CLEARCOAT_H
 
+#include "kernel/materials/coat_table.h"
 #include "kernel/materials/microfacet.h"
 #include "kernel/materials/shading_normal.h"
 
@@ -42,11 +43,12 @@ CRT_FN vec4 crt_clear_left(vec4 depth, f32 way) {
                      crt_exp_negative(-V4Z(depth) * way), crt_exp_negative(-V4W(depth) * way));
 }
 
-/* D, where the coat mirrors the share `fresnel` of light from inside along the same way. */
-CRT_FN vec4 crt_clear_darkening(CRT_GLOBAL const CrtLayers *layers, f32 roughness, f32 fresnel, vec4 base) {
-    const f32 k = crt_min(crt_fma(layers->clear_internal - fresnel, roughness, fresnel), CRT_CLEAR_K_MAX);
+/* D, where the coat sends back the share `internal` of diffuse light from below, and mirrors the share
+   `fresnel` of light from inside along the same way. `roughness`: of the base. */
+CRT_FN vec4 crt_clear_darkening(f32 darkening, f32 internal, f32 roughness, f32 fresnel, vec4 base) {
+    const f32 k = crt_min(crt_fma(internal - fresnel, roughness, fresnel), CRT_CLEAR_K_MAX);
     const vec4 darkened = splat4(1.0f - k) / (splat4(1.0f) - base * k);
-    return splat4(1.0f) + (darkened - splat4(1.0f)) * layers->clear_darkening;
+    return splat4(1.0f) + (darkened - splat4(1.0f)) * darkening;
 }
 
 /* Of the material; 0 without a coat. */
@@ -63,19 +65,22 @@ CRT_FN void crt_prepare_clearcoat(const CrtContext *ctx, CrtBsdf *b, CRT_GLOBAL 
     const f32 towards = dot3(b->wo, b->ns);
     if (!(towards > 0.0f)) b->wo = crt_mirrored(b->wo, b->ns); /* seen as what is not Lambertian is */
     const f32 cosine = crt_min(crt_abs(towards), 1.0f);
-    const f32 roughness = V4X(crt_value(ctx, layers->clear_base, surface, position));
-    f32 mirrored = crt_fresnel_dielectric(cosine, eta), facing = crt_fresnel_dielectric(1.0f, eta);
-    const vec4 darkening = crt_clear_darkening(layers, roughness, mirrored, b->albedo);
-    const vec4 straight_on = crt_clear_darkening(layers, roughness, facing, b->albedo);
+    const f32 share = layers->clear_base_share;
+    const f32 base =
+        crt_fma(V4X(crt_value(ctx, layers->clear_base, surface, position)), share, 1.0f - share);
+    const f32 roughness = CRT_HAS(COAT_TEXTURE)
+                              ? V4X(crt_value(ctx, layers->clear_roughness, surface, position))
+                              : crt_from_bits(layers->clear_roughness);
+    const CrtCoat coat = crt_coat(ctx, layers->clear_albedo, layers->clear_internal, roughness);
+    const f32 internal = crt_coat_returns(ctx, layers->clear_internal, roughness);
+    const f32 dark = layers->clear_darkening;
+    const vec4 darkening =
+        crt_clear_darkening(dark, internal, base, crt_fresnel_dielectric(cosine, eta), b->albedo);
+    const vec4 straight_on =
+        crt_clear_darkening(dark, internal, base, crt_fresnel_dielectric(1.0f, eta), b->albedo);
+    const f32 mirrored = crt_coat_reflects(coat, cosine, eta), facing = crt_coat_reflects(coat, 1.0f, eta);
     b->clear_eta = eta;
-    b->clear_alpha = 0.0f;
-    if (CRT_HAS(TABLE) && (layers->clear_albedo & CRT_VALUE_REFERENCE) != 0u) {
-        CRT_GLOBAL const f32 *table = CRT_ARRAY(f32, ctx->blob, ctx->scene->spectra) +
-                                      (layers->clear_albedo & CRT_VALUE_INDEX) * CRT_SPECTRUM_STRIDE;
-        mirrored = crt_lookup(table, cosine * CRT_COAT_STEPS);
-        facing = crt_lookup(table, CRT_COAT_STEPS);
-        b->clear_alpha = layers->clear_roughness * layers->clear_roughness;
-    }
+    b->clear_alpha = crt_is_rough_coat(coat) ? roughness * roughness : 0.0f;
     b->clear_depth = crt_value(ctx, layers->clear_depth, surface, position);
     const vec4 once = crt_clear_left(b->clear_depth, 1.0f);
     b->clear_albedo = mirrored;

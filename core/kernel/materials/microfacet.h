@@ -10,10 +10,6 @@
 
 CRT_KERNEL_BEGIN
 
-/* Narrower than this GGX is taken for a mirror: its value and density would lose their digits in single
-   precision, and the difference would not be visible. */
-#define CRT_ALPHA_MIN 1e-3f
-
 /* Two directions in the shading frame, each with the root of Smith's shadowing, a = √(cos² + α² sin²),
    of which Λ = (a/cos − 1)/2 (Heitz 2014); and GGX's density of the normal halfway. */
 typedef struct CrtMicrofacet {

@@ -9,23 +9,22 @@
  * sends back from below, which (1 − k) η² = 1 − Ē ties to what it lets in. It is Mitsuba's
  * `roughplastic` with `nonlinear` (Jakob et al. 2022), whose tables of transmittance are here E of
  * microfacets that mirror once: what they lose enters. It is reciprocal, and a white base sends all light
- * back.
+ * back. A tint (tint.h) is on f_coat alone.
  */
 #ifndef CRT_PLASTIC_H
 #define CRT_PLASTIC_H
 
+#include "kernel/materials/coat_table.h"
 #include "kernel/materials/microfacet.h"
 #include "kernel/materials/rough_base.h"
 #include "kernel/materials/shading_normal.h"
+#include "kernel/materials/tint.h"
 
 CRT_KERNEL_BEGIN
 
-/* E(θ) of a rough coat, tabulated by the compiler of the scene at cosines in steps of 1/CRT_COAT_STEPS; of
-   a smooth one, Fresnel's. */
+/* E(θ). */
 CRT_FN f32 crt_coat_albedo(const CrtBsdf *b, f32 cosine) {
-    const f32 c = crt_min(cosine, 1.0f);
-    if (CRT_HAS(TABLE) && b->coat != 0) return crt_lookup(b->coat, c * CRT_COAT_STEPS);
-    return crt_fresnel_dielectric(c, V4X(b->eta));
+    return crt_coat_reflects(b->coat, crt_min(cosine, 1.0f), V4X(b->eta));
 }
 
 /* f·|cos| without what a smooth coat mirrors, and its density. About an interpolated normal, what the base
@@ -53,12 +52,12 @@ CRT_FN vec4 crt_plastic(const CrtBsdf *b, vec3 wi, f32 *pdf) {
     }
     const vec4 base = crt_has_rough_base(b) ? rough : b->reflectance * entering;
     *pdf = (1.0f - b->coat_chance) * lambert;
-    if (!(CRT_HAS(TABLE) && b->coat != 0) || !(cos_i > 0.0f)) return base;
+    if (!crt_is_rough_coat(b->coat) || !(cos_i > 0.0f)) return base;
     const CrtMicrofacet m = crt_microfacet(b, wi);
     if (!(m.cos_o > 0.0f)) return base;
     *pdf += b->coat_chance * m.density / (2.0f * (m.cos_o + m.root_o));
-    return base + splat4(crt_fresnel_dielectric(m.cos_m, V4X(b->eta)) * m.density * m.cos_i /
-                         (2.0f * (m.root_o * m.cos_i + m.root_i * m.cos_o)));
+    return base + crt_tinted(b, splat4(crt_fresnel_dielectric(m.cos_m, V4X(b->eta)) * m.density * m.cos_i /
+                                       (2.0f * (m.root_o * m.cos_i + m.root_i * m.cos_o))));
 }
 
 /* `choice`: of coat and base. Light that a smooth coat mirrors has the density 0 of a delta; the rest has
@@ -66,9 +65,9 @@ CRT_FN vec4 crt_plastic(const CrtBsdf *b, vec3 wi, f32 *pdf) {
 CRT_FN CrtScatter crt_sample_plastic(const CrtBsdf *b, CrtRandom2 u, f32 choice) {
     CrtScatter s = crt_no_scatter();
     if (choice < b->coat_chance) {
-        if (!(CRT_HAS(TABLE) && b->coat != 0))
-            return crt_sample_mirror_up(b,
-                                        splat4(crt_coat_albedo(b, dot3(b->wo, b->ns)) / b->coat_chance));
+        if (!crt_is_rough_coat(b->coat))
+            return crt_sample_mirror_up(
+                b, crt_tinted(b, splat4(crt_coat_albedo(b, dot3(b->wo, b->ns)) / b->coat_chance)));
         s.wi = normalize3(crt_reflect(b->wo, crt_visible_normal(b, u)));
         s.valid = dot3(s.wi, b->ns) > 0.0f;
     } else {

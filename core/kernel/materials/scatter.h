@@ -26,6 +26,10 @@ CRT_KERNEL_BEGIN
 /* A BSDF without CRT_BSDF_DELTA may still have single directions beside its lobe: crt_bsdf_sample gives
    those the pdf 0, and crt_bsdf is of the lobe alone. */
 
+/* Narrower than this GGX is taken for a mirror: its value and density would lose their digits in single
+   precision, and the difference would not be visible. */
+#define CRT_ALPHA_MIN 1e-3f
+
 /* The rows in the tables of losses of a rough material (compensation.h). */
 typedef struct CrtLosses {
     CRT_GLOBAL const f32 *rows; /* of the outside, at the roughness at or below, at the first index */
@@ -35,6 +39,12 @@ typedef struct CrtLosses {
     f32 between;                /* how far on to the row of the next roughness */
     vec4 index;                 /* rows from the first index to those of the path's wavelengths */
 } CrtLosses;
+
+/* The table of what a coat reflects by the cosine (coat_table.h). */
+typedef struct CrtCoat {
+    CRT_GLOBAL const f32 *table; /* 0: it is smooth, and Fresnel's equations say it */
+    f32 between;                 /* how far on to the next table; 0: there may be none */
+} CrtCoat;
 
 /* A material at one vertex. Members that its kind does not use are not set. */
 typedef struct CrtBsdf {
@@ -60,8 +70,9 @@ typedef struct CrtBsdf {
     f32 lost_chance;  /* rough: of sampling what is given back */
     f32 back_share;   /* rough dielectric: of that, this side's */
     CrtLosses losses; /* rough */
+    vec4 tint;        /* metals and plastic: on what is mirrored (tint.h) */
     f32 coat_chance;  /* plastic: of sampling the coat */
-    CRT_GLOBAL const f32 *coat; /* plastic: table of what it reflects by the cosine; 0: it is smooth */
+    CrtCoat coat;     /* plastic: what it reflects by the cosine */
     CRT_GLOBAL const f32 *base_loss; /* plastic: table of its rough base; 0: Lambert's; otherwise: */
     f32 base_roughness;
     f32 fuzz_albedo;  /* what the fuzz takes of light towards w_o; 0: there is none; otherwise: */

@@ -4,9 +4,9 @@
  * scattered rays, because both techniques see a light through the same surfaces. Passing counts neither
  * towards the depth nor as another ray. Roulette counts panes, because each costs another search.
  *
- * A pane transmits T(θ, λ) (pane.h). A shadow ray multiplies the light that it tests by T. A path's ray
- * passes with probability q, the mean of T over its wavelengths, and then carries T/q. Otherwise it stops,
- * carries 1/(1 − q), and crt_shade reflects 1 − T of it.
+ * A pane transmits T(θ, λ) (pane.h), here with its tint. A shadow ray multiplies the light that it tests
+ * by T. A path's ray passes with probability q, the mean of T over its wavelengths, and then carries T/q.
+ * Otherwise it stops, carries 1/(1 − q), and crt_shade reflects 1 − T of it, T without the tint.
  */
 #ifndef CRT_PASSING_H
 #define CRT_PASSING_H
@@ -15,6 +15,7 @@
 #include "kernel/materials/composition.h"
 #include "kernel/materials/medium.h"
 #include "kernel/materials/pane.h"
+#include "kernel/materials/tint.h"
 
 CRT_KERNEL_BEGIN
 
@@ -74,7 +75,8 @@ CRT_FN int crt_passes_pane(const CrtContext *ctx, const CrtSurface *surface, u32
     CrtBsdf pane;
     pane.flags = 0u;
     crt_prepare_pane(ctx, &pane, &made_of, surface, way->position);
-    const vec4 through = crt_pane_transmittance(&pane, crt_pane_cosine(surface, way->d));
+    vec4 through = crt_pane_transmittance(&pane, crt_pane_cosine(surface, way->d));
+    if (CRT_HAS(TINT)) through = through * crt_tint(ctx, made_of.flags, material, surface, way->position);
     if (way->shadow) {
         way->carried = way->carried * through;
         return max4(way->carried) > 0.0f;

@@ -78,12 +78,12 @@ struct GltfMaterials::Surface {
     std::string opacity;
     std::string normal_map;
     Keys dielectric;  ///< Keys of what is not metal.
-    Keys layers;      ///< Keys of coat and fuzz.
-    bool rough_coat = false;
+    std::string gloss_color;  ///< Tint of the gloss on what is neither metal nor clear.
+    Keys layers;              ///< Keys of coat and fuzz.
     std::string clear;  ///< Share of the dielectric that is glass; empty: none.
     bool all_clear = false, absorbs = false;
     std::string pane;  ///< Share of the surface that is a pane; empty: none.
-    std::string pane_ior;
+    std::string pane_ior, pane_tint;
 
     /// A share of glass or of a pane that a texture says counts as all of it.
     double mirrors() const {
@@ -250,14 +250,28 @@ void GltfMaterials::readDielectric(Source& source, Surface& surface) {
     if (ior != 1.5) surface.dielectric.emplace_back("specular_ior", yamlNumber(ior));
     const Value& specular = gltfExtension(source.material, "KHR_materials_specular");
     if (!specular.IsObject()) return;
-    const std::array<double, 3> color = gltfColor(specular, "specularColorFactor", kWhite);
+    std::array<double, 3> color = gltfColor(specular, "specularColorFactor", kWhite);
     double factor = unitOf(gltfNumber(specular, "specularFactor", 1));
-    if (color[0] == color[1] && color[1] == color[2])
-        factor = std::min(factor * color[0], 1.0);
-    else
-        losses_.add("the colour of specular reflections of a dielectric");
-    if (specular.Has("specularTexture") || specular.Has("specularColorTexture"))
-        losses_.add("textures of specular reflections");
+    // Grey, and what is above 1, is OpenPBR's weight: a factor straight on. Its index is 10 at most.
+    const bool grey = color[0] == color[1] && color[1] == color[2];
+    const double most = gltfLargest(color), straight_on = std::pow((ior - 1) / (ior + 1), 2);
+    if (grey || most > 1) {
+        factor *= most;
+        for (double& c : color) c = grey ? 1 : c / most;
+    }
+    constexpr double kMost = 0.66;
+    if (factor * straight_on > kMost) {
+        losses_.add("specular reflections of more than two thirds of the light: crt uses two thirds");
+        factor = kMost / straight_on;
+    }
+    const auto texture = usable(source, textures_.named(specular, "specularColorTexture", source.pointer),
+                                "the texture of the colour of specular reflections");
+    if (texture)
+        surface.gloss_color =
+            textures_.form(*texture, color == kWhite ? "" : ", factor: " + yamlList(color));
+    else if (color != kWhite)
+        surface.gloss_color = colorText(color);
+    if (specular.Has("specularTexture")) losses_.add("a texture of the strength of specular reflections");
     if (factor != 1) surface.dielectric.emplace_back("specular_weight", yamlNumber(factor));
 }
 
@@ -272,8 +286,7 @@ void GltfMaterials::readClear(Source& source, Surface& surface) {
     const double thickness = gltfNumber(volume, "thicknessFactor", 0);
     if (!(thickness > 0)) {
         surface.pane = share;
-        if (surface.color_factor != kWhite || surface.color.starts_with("{texture"))
-            losses_.add("the tint of what a pane lets through");
+        if (surface.color != "1") surface.pane_tint = surface.color;
         return;
     }
     surface.clear = share;
@@ -311,21 +324,15 @@ void GltfMaterials::readCoat(Source& source, Surface& surface) {
     const std::string share = weight(source, textures_.named(coat, "clearcoatTexture", source.pointer),
                                      factor, "red", "the texture of the clear coat");
     if (share.empty()) return;
-    double rough = unitOf(gltfNumber(coat, "clearcoatRoughnessFactor", 0));
-    if (const auto texture =
-            usable(source, textures_.named(coat, "clearcoatRoughnessTexture", source.pointer),
-                   "the texture of the clear coat's roughness")) {
-        const TexelStatistics& texels = textures_.statistics(*texture);
-        if (!texels.isConstant(1) && rough > 0)
-            losses_.add("the texture of a clear coat's roughness: crt uses its mean");
-        rough *= texels.mean[1];
-    }
+    const std::string rough =
+        weight(source, textures_.named(coat, "clearcoatRoughnessTexture", source.pointer),
+               unitOf(gltfNumber(coat, "clearcoatRoughnessFactor", 0)), "green",
+               "the texture of the clear coat's roughness");
     if (coat.Has("clearcoatNormalTexture")) losses_.add("the normal map of a clear coat");
     surface.layers.emplace_back("coat_weight", share);
-    if (rough > 0) surface.layers.emplace_back("coat_roughness", yamlNumber(rough));
+    surface.layers.emplace_back("coat_roughness", rough);
     surface.layers.emplace_back("coat_ior", "1.5");
     surface.layers.emplace_back("coat_darkening", "0");
-    surface.rough_coat = rough > 0;
 }
 
 void GltfMaterials::readFuzz(Source& source, Surface& surface) {
@@ -405,28 +412,20 @@ void GltfMaterials::add(const std::string& name, const Keys& keys) {
 
 /// One openpbr material, or, where OpenPBR says it of metal or of glass alone, a mix of two.
 void GltfMaterials::write(const std::string& name, const Surface& s) {
-    const bool metal = s.metal > 0 || !s.metal_texture.empty(), textured = !s.rough_texture.empty();
+    const bool metal = s.metal > 0 || !s.metal_texture.empty();
     const bool dielectric = s.metal < 1 || !s.metal_texture.empty();
     const bool weighted = std::any_of(s.dielectric.begin(), s.dielectric.end(),
                                       [](const auto& key) { return key.first == "specular_weight"; });
-    const bool split = metal && dielectric && (textured || weighted);
-    const bool glossy = dielectric && !s.all_clear;
-    if (textured && glossy)
-        losses_.add(
-            "the texture of a dielectric's roughness: crt uses its mean, since its gloss has a uniform "
-            "roughness");
-    if (textured && s.rough_coat && metal)
-        losses_.add("the texture of the roughness under a rough coat: crt uses its mean");
-    const auto roughness = [&](bool as_texture) {
-        return as_texture && textured ? s.rough_texture : yamlNumber(s.rough);
-    };
-    const std::string metal_roughness = roughness(!s.rough_coat), clear_roughness = roughness(!glossy);
-    const auto keysOf = [&](const std::string& metalness, const std::string& rough, bool with_dielectric,
-                            bool whole) {
+    const bool tinted = !s.gloss_color.empty() && s.clear.empty();
+    if (!s.gloss_color.empty() && !tinted) losses_.add("the colour of specular reflections of glass");
+    const bool split = metal && dielectric && (weighted || tinted);
+    const std::string roughness = s.rough_texture.empty() ? yamlNumber(s.rough) : s.rough_texture;
+    const auto keysOf = [&](const std::string& metalness, bool with_dielectric, bool whole) {
         Keys keys{{"type", "openpbr"}, {"base_color", s.color}};
         if (metalness != "0") keys.emplace_back("base_metalness", metalness);
-        keys.emplace_back("specular_roughness", rough);
+        keys.emplace_back("specular_roughness", roughness);
         if (with_dielectric) keys.insert(keys.end(), s.dielectric.begin(), s.dielectric.end());
+        if (with_dielectric && tinted) keys.emplace_back("specular_color", s.gloss_color);
         keys.insert(keys.end(), s.layers.begin(), s.layers.end());
         keys.emplace_back("normal_map", s.normal_map);
         if (whole) keys.emplace_back("geometry_opacity", s.opacity);
@@ -437,20 +436,23 @@ void GltfMaterials::write(const std::string& name, const Surface& s) {
     if (split) {
         const std::string below = names_.take(name + " (dielectric)", ""),
                           above = names_.take(name + " (metal)", "");
-        add(below, keysOf("0", clear_roughness, true, false));
-        add(above, keysOf("1", metal_roughness, false, false));
+        add(below, keysOf("0", true, false));
+        add(above, keysOf("1", false, false));
         add(surface, {{"type", "mix"},
                       {"materials", fmt::format("[{}, {}]", yamlText(below), yamlText(above))},
                       {"amount", s.metal_texture.empty() ? yamlNumber(s.metal) : s.metal_texture},
                       {"opacity", pane ? "" : s.opacity}});
     } else {
         const std::string metalness = s.metal_texture.empty() ? yamlNumber(s.metal) : s.metal_texture;
-        add(surface, keysOf(metalness, dielectric ? clear_roughness : metal_roughness, dielectric, !pane));
+        add(surface, keysOf(metalness, dielectric, !pane));
     }
     if (!pane) return;
     if (s.rough > 0.1) losses_.add("the roughness of a pane");
     const std::string glass = names_.take(name + " (pane)", "");
-    add(glass, {{"type", "thin_dielectric"}, {"ior", s.pane_ior}, {"normal_map", s.normal_map}});
+    add(glass, {{"type", "thin_dielectric"},
+                {"ior", s.pane_ior},
+                {"tint", s.pane_tint},
+                {"normal_map", s.normal_map}});
     add(name, {{"type", "mix"},
                {"materials", fmt::format("[{}, {}]", yamlText(surface), yamlText(glass))},
                {"amount", s.pane},

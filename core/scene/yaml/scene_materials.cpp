@@ -73,6 +73,13 @@ void MaterialReader::readMaterial(const YamlEntry& entry) {
     else if (section->schema().find("roughness") != nullptr)
         takeNumber("roughness", material.roughness, material.roughness_texture);
     if (section->schema().find("reflectance") != nullptr) takeReflectance();
+    if (section->schema().find("tint") != nullptr) {
+        if (TextureReader::isTexture(*section, "tint"))
+            material.tint_texture =
+                textures_.read(*section, "tint", TexelKind::Spectra).value_or(kNoTexture);
+        else
+            material.tint = spectra_.read(*section, "tint", SpectrumUse::Reflectance);
+    }
     for (const auto& [key, member] : kMaterialNumbers)
         if (section->schema().find(key) != nullptr) section->read(key, material.*member);
     switch (material.type) {

@@ -56,7 +56,7 @@ struct MaterialReader::OpenPbr {
     Material like;  ///< Properties that all its parts share.
     double base_weight = 1, diffuse_roughness = 0;
     Spectrum base_color = constantSpectrum(0.8), specular_color = constantSpectrum(1);
-    TextureIndex base_texture = kNoTexture;
+    TextureIndex base_texture = kNoTexture, specular_texture = kNoTexture;
     Weight metalness{}, transmission{}, roughness{0.3};
     double specular_weight = 1, ior = 1.5;
     Spectrum transmission_color = constantSpectrum(1);
@@ -64,7 +64,8 @@ struct MaterialReader::OpenPbr {
     double film_weight = 0, film_um = 0.5, film_ior = 1.4;
     Weight coat{};
     Spectrum coat_color = constantSpectrum(1);
-    double coat_roughness = 0, coat_anisotropy = 0, coat_ior = 1.6, coat_darkening = 1;
+    Weight coat_roughness{};
+    double coat_anisotropy = 0, coat_ior = 1.6, coat_darkening = 1;
 
     double emission_luminance = 0;
     Spectrum emission_color = rgbEmission({1, 1, 1});
@@ -79,6 +80,9 @@ struct MaterialReader::OpenPbr {
 private:
     void number(const char* key, Weight& into) const;
     void color(const char* key, Spectrum& into) const;
+    bool hasVaryingGloss() const {
+        return roughness.isTextured() || (coat.mayBeAbove0() && coat_roughness.isTextured());
+    }
     bool isMetal() const { return metalness.mayBeAbove0(); }
     bool isOpaque() const { return metalness.mayBeBelow1() && transmission.mayBeBelow1(); }
     bool isClear() const { return metalness.mayBeBelow1() && transmission.mayBeAbove0(); }
@@ -90,7 +94,7 @@ private:
     }
     void setColor(Material& part) const;
     void setRoughness(Material& part, bool coated) const;
-    void setCoat(Material& part, double base_roughness) const;
+    void setCoat(Material& part, double share) const;
     Material metal(bool coated) const;
     Material glossy(bool coated) const;
     Material clear(bool under_film) const;
@@ -120,7 +124,11 @@ void MaterialReader::OpenPbr::read() {
     section.read("base_diffuse_roughness", diffuse_roughness);
     number("base_metalness", metalness);
     section.read("specular_weight", specular_weight);
-    color("specular_color", specular_color);
+    if (TextureReader::isTexture(section, "specular_color"))
+        specular_texture =
+            reader.textures_.read(section, "specular_color", TexelKind::Spectra).value_or(kNoTexture);
+    else
+        color("specular_color", specular_color);
     number("specular_roughness", roughness);
     section.read("specular_roughness_anisotropy", like.anisotropy);
     section.read("anisotropy_rotation_deg", like.anisotropy_rotation_deg);
@@ -141,7 +149,7 @@ void MaterialReader::OpenPbr::read() {
         emission_color = *std::move(s);
     number("coat_weight", coat);
     color("coat_color", coat_color);
-    section.read("coat_roughness", coat_roughness);
+    number("coat_roughness", coat_roughness);
     section.read("coat_roughness_anisotropy", coat_anisotropy);
     section.read("coat_ior", coat_ior);
     section.read("coat_darkening", coat_darkening);
@@ -158,12 +166,14 @@ void MaterialReader::OpenPbr::refuseCoat(const No& no) const {
        "leave 'coat_weight' or 'transmission_weight' out");
     no(has && (coat_ior < 1 || coat_ior > 10), "coat_ior", "a coat needs an index of 1 to 10",
        "give 'coat_ior' from 1 to 10");
-    no(has && coat_roughness > 0 && coat_anisotropy > 0, "coat_roughness_anisotropy",
+    no(has && coat_roughness.mayBeAbove0() && coat_anisotropy > 0, "coat_roughness_anisotropy",
        "a coat must be isotropic, because its reflection is tabulated",
        "leave 'coat_roughness_anisotropy' out");
-    no(has && coat_roughness > 0 && isMetal() && roughness.isTextured(), "specular_roughness",
-       "a metal under a rough coat needs a uniform roughness",
-       "give 'specular_roughness' a number, or 'coat_roughness' 0");
+    no(has && isMetal() && coat_roughness.isTextured() && like.anisotropy > 0, "coat_roughness",
+       "an anisotropic metal needs a coat of uniform roughness, because the energy loss of its microfacets "
+       "is "
+       "tabulated",
+       "give 'coat_roughness' a number, or leave 'specular_roughness_anisotropy' out");
     no(has && emission_luminance > 0, "emission_luminance",
        "the coat would take some of the emitted light, and crt supports emission only from the top layer",
        "leave 'coat_weight' or 'emission_luminance' out");
@@ -195,15 +205,17 @@ void MaterialReader::OpenPbr::refuse() const {
        "crt does not multiply a texture by 'base_weight'", "leave 'base_weight' out");
     no(isMetal() && specular_weight > 1, "specular_weight",
        "a metal would reflect more light than it receives", "give 'specular_weight' 1 or less");
-    no((coated || isClear()) && !isWhite(specular_color), "specular_color",
-       "crt supports 'specular_color' for metals only",
-       "leave 'specular_color' out, or give 'base_metalness' 1");
+    no(isClear() && (!isWhite(specular_color) || specular_texture != kNoTexture), "specular_color",
+       "crt supports 'specular_color' for what is opaque only",
+       "leave 'specular_color' or 'transmission_weight' out");
+    no(isMetal() && specular_texture != kNoTexture, "specular_color",
+       "a metal needs a uniform 'specular_color'", "give a colour, or leave 'base_metalness' out");
     no(coated && like.anisotropy > 0, "specular_roughness_anisotropy",
        "the gloss on an opaque base must be isotropic, because its reflection is tabulated",
        "leave it out, or give 'base_metalness' or 'transmission_weight' 1");
-    no(coated && roughness.isTextured(), "specular_roughness",
-       "the gloss on an opaque base needs a uniform roughness, because its reflection is tabulated",
-       "give a number, or 'base_metalness' or 'transmission_weight' 1");
+    no(coated && diffuse_roughness > 0 && hasVaryingGloss(), "base_diffuse_roughness",
+       "a rough diffuse base needs a gloss of uniform roughness, because what it loses is tabulated",
+       "leave 'base_diffuse_roughness' out, or give 'specular_roughness' and 'coat_roughness' numbers");
     no(coated && indices([](double n) { return n < 1 || n > 10; }), "specular_ior",
        "the index of the gloss on an opaque base must be 1 to 10, including the effect of 'specular_weight'",
        "give 'specular_ior' of at least 1, and a smaller 'specular_weight'");
@@ -244,21 +256,26 @@ void MaterialReader::OpenPbr::setColor(Material& part) const {
 void MaterialReader::OpenPbr::setRoughness(Material& part, bool coated) const {
     part.roughness = roughness.value;
     part.roughness_texture = roughness.texture;
-    if (coated && coat_roughness > 0)
+    const double above = coat_roughness.value;
+    if (coated && coat_roughness.mayBeAbove0() && !hasVaryingGloss())
         part.roughness = std::min(1.0, std::sqrt(std::hypot(roughness.value * roughness.value,
-                                                            std::numbers::sqrt2 * coat_roughness *
-                                                                coat_roughness)));
+                                                            std::numbers::sqrt2 * above * above)));
 }
 
-void MaterialReader::OpenPbr::setCoat(Material& part, double base_roughness) const {
+/// The base under the coat counts as rough by this share of its roughness, and for the rest as rough as can
+/// be.
+void MaterialReader::OpenPbr::setCoat(Material& part, double share) const {
     Clearcoat& it = part.clearcoat.emplace();
     it.ior = coat_ior;
-    it.roughness = coat_roughness;
+    it.roughness = coat_roughness.value;
+    it.roughness_texture = coat_roughness.texture;
+    it.roughens = hasVaryingGloss() && coat_roughness.mayBeAbove0();
     it.depth = coat_color.isConstant() ? constantSpectrum(opticalDepth(coat_color[0]) / 2) : coat_color;
     if (!coat_color.isConstant())
         for (double& depth : it.depth.values) depth = opticalDepth(depth) / 2;
     it.darkening = coat_darkening;
-    it.base_roughness = base_roughness;
+    it.base_roughness = std::lerp(1.0, roughness.value, share);
+    it.base_share = share;
 }
 
 Material MaterialReader::OpenPbr::metal(bool coated) const {
@@ -269,7 +286,7 @@ Material MaterialReader::OpenPbr::metal(bool coated) const {
     part.weight = specular_weight;
     setColor(part);
     setRoughness(part, coated);
-    if (coated) setCoat(part, roughness.value);
+    if (coated) setCoat(part, 1);
     return part;
 }
 
@@ -278,7 +295,7 @@ Material MaterialReader::OpenPbr::glossy(bool coated) const {
     setColor(part);
     part.diffuse_roughness = diffuse_roughness;
     const double n = index(coated);
-    if (coated) setCoat(part, std::lerp(1.0, roughness.value, reflectedStraightOn(n)));
+    if (coated) setCoat(part, reflectedStraightOn(n));
     if (n == 1) {
         makeRoughDiffuse(part);
         return part;
@@ -286,6 +303,8 @@ Material MaterialReader::OpenPbr::glossy(bool coated) const {
     part.type = MaterialType::Plastic;
     part.by_color = true;
     part.eta = constantSpectrum(n);
+    part.tint_texture = specular_texture;
+    if (!isWhite(specular_color)) part.tint = specular_color;
     setRoughness(part, coated);
     return part;
 }

@@ -587,6 +587,16 @@ KeySchema textured(KeySchema key) {
     return key;
 }
 
+/// Of metals, gloss and panes.
+KeySchema tintKey(const char* what) {
+    return {.name = "tint",
+            .kind = Kind::Spectrum,
+            .range = {.min = 0, .max = 1},
+            .section = "texture",
+            .fallback = "1",
+            .doc = what};
+}
+
 void addDielectrics(std::vector<SectionSchema>& all) {
     const auto index = [](const char* doc) {
         return KeySchema{.name = "ior",
@@ -630,17 +640,20 @@ void addDielectrics(std::vector<SectionSchema>& all) {
          "as smooth.",
          {materialType("rough_dielectric"), ior, textured(roughnessKey("smooth")), absorption,
           thinFilmKey()}});
-    all.push_back({"material/thin_dielectric",
-                   "a thin_dielectric material",
-                   "A window pane made of one sheet of faces: two parallel surfaces, between which light is "
-                   "reflected back and forth, each polarisation by itself. Transmitted light is not bent, "
-                   "and a passage is not a scattering event. Light of every kind passes up to 4096 panes "
-                   "and holes in a row. A normal map affects the mirrored light only. AOVs of first hits "
-                   "describe the surface that stops a ray: mostly the one behind the pane, and the "
-                   "pane itself in the share that it mirrors. A film is on one of the two surfaces.",
-                   {materialType("thin_dielectric"),
-                    index("Refractive index of the pane relative to its surroundings."),
-                    thinFilmKey()}});
+    all.push_back(
+        {"material/thin_dielectric",
+         "a thin_dielectric material",
+         "A window pane made of one sheet of faces: two parallel surfaces, between which light is "
+         "reflected back and forth, each polarisation by itself. Transmitted light is not bent, "
+         "and a passage is not a scattering event. Light of every kind passes up to 4096 panes "
+         "and holes in a row. A normal map affects the mirrored light only. AOVs of first hits "
+         "describe the surface that stops a ray: mostly the one behind the pane, and the "
+         "pane itself in the share that it mirrors. A film is on one of the two surfaces.",
+         {materialType("thin_dielectric"),
+          index("Refractive index of the pane relative to its surroundings."),
+          tintKey("Share of the transmitted light that is left, at every wavelength and the same at "
+                  "all angles: coloured glass. The mirrored light has no tint."),
+          thinFilmKey()}});
 }
 
 void addMaterials(std::vector<SectionSchema>& all) {
@@ -680,13 +693,15 @@ void addMaterials(std::vector<SectionSchema>& all) {
                       .kind = Kind::Spectrum,
                       .range = kNotNegative,
                       .doc = "Its imaginary part, the extinction."};
+    const KeySchema metal_tint = tintKey(
+        "Factor on each reflection, at every wavelength: a colour that Fresnel's equations do not give.");
     const std::vector<KeyRule> metal_or_index{{KeyRule::Kind::ExactlyOne, {"metal", "eta"}},
                                               {KeyRule::Kind::Together, {"eta", "k"}}};
     all.push_back({"material/conductor",
                    "a conductor material",
                    "A smooth metal: Fresnel's equations with a complex index. Give "
                    "`metal`, or `eta` with `k`.",
-                   {materialType("conductor"), metal, eta, k, thinFilmKey()},
+                   {materialType("conductor"), metal, eta, k, metal_tint, thinFilmKey()},
                    metal_or_index});
     all.push_back(
         {"material/rough_conductor",
@@ -696,7 +711,8 @@ void addMaterials(std::vector<SectionSchema>& all) {
          "deeper colours. This lobe has the form of Kulla and Conty (2017); its strength is fitted to "
          "random walks on Smith's surface, from which albedos differ by at most 0.03 "
          "(decision 0021). Give `metal`, or `eta` with `k`.",
-         {materialType("rough_conductor"), metal, eta, k, textured(roughnessKey("a mirror")), thinFilmKey()},
+         {materialType("rough_conductor"), metal, eta, k, textured(roughnessKey("a mirror")), metal_tint,
+          thinFilmKey()},
          metal_or_index});
     addDielectrics(all);
     all.push_back(
@@ -709,7 +725,10 @@ void addMaterials(std::vector<SectionSchema>& all) {
          "coat Mitsuba's model loses energy and is darker; this one doesn't.",
          {materialType("plastic"),
           reflectance,
-          roughnessKey("a polished coat", "0"),
+          textured(roughnessKey("a polished coat", "0")),
+          tintKey(
+              "Factor on what the coat mirrors, at every wavelength. The coat absorbs the rest; the base "
+              "keeps its colour."),
           {.name = "ior",
            .kind = Kind::Number,
            .range = {.min = 1, .max = 10},

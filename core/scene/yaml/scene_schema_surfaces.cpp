@@ -89,18 +89,22 @@ void addOpenPbr(std::vector<SectionSchema>& all) {
         "microfacets, as elsewhere in crt. Subsurface and thin walls are refused where they would be "
         "visible, and so are features that crt's own material lacks; the message says what to write "
         "instead. Other keys of the specification are unknown.",
-        {typeKey("openpbr", "material"), weight("base_weight", "1", "Factor on `base_color`."),
+        {typeKey("openpbr", "material"),
+         weight("base_weight", "1", "Factor on `base_color`."),
          color("base_color", "0.8",
                "For metals the reflectance at normal incidence, for other materials the colour of the base.",
                true),
          weight("base_diffuse_roughness", "0",
-                "As `roughness` of `diffuse`, of what comes out of the gloss."),
+                "As `roughness` of `diffuse`, of what comes out of the gloss, whose roughness and whose "
+                "coat's must be numbers then."),
          weight("base_metalness", "0", "Share of the surface that is metal.", true),
          amount("specular_weight", kNotNegative, "1",
                 "Factor on what is reflected straight on: of dielectrics by another index, of metals at all "
                 "angles."),
          color("specular_color", "1",
-               "Of metals the share of Schlick's reflectance that is left at 82°. Must be 1 for others."),
+               "Of metals the share of Schlick's reflectance that is left at 82°, which is no texture. Of "
+               "the gloss on an opaque base a factor on what is mirrored. Must be 1 for clear ones.",
+               true),
          weight("specular_roughness", "0.3", "As `roughness` of `rough_conductor`.", true),
          weight("specular_roughness_anisotropy", "0", "As `roughness_anisotropy` of `rough_conductor`."),
          amount("anisotropy_rotation_deg", {.min = -360, .max = 360}, "0",
@@ -132,7 +136,8 @@ void addOpenPbr(std::vector<SectionSchema>& all) {
                "longer and the colour deeper."),
          weight("coat_roughness", "0",
                 "As `roughness` of `plastic`. Layers below a rough coat look rougher: "
-                "(`specular_roughness`⁴ + 2 `coat_roughness`⁴)^¼, at most 1."),
+                "(`specular_roughness`⁴ + 2 `coat_roughness`⁴)^¼, at most 1.",
+                true),
          weight("coat_roughness_anisotropy", "0", "Above 0 it is refused where the coat is rough."),
          amount("coat_ior", {.min = 1e-3, .max = 1e3}, "1.6",
                 "Its index relative to the outside. Below 1 and above 10 it is refused."),
@@ -158,8 +163,7 @@ void addOpenPbr(std::vector<SectionSchema>& all) {
           .doc = "Its spectrum, times that. An `rgb` of 1 is D65 of luminance 1; a darker or brighter "
                  "colour makes a darker or brighter light."},
          weight("geometry_opacity", "1",
-                "Opacity of the surface; light passes the rest unchanged, shadow rays too.",
-                true),
+                "Opacity of the surface; light passes the rest unchanged, shadow rays too.", true),
          {.name = "geometry_thin_walled",
           .kind = Kind::Boolean,
           .fallback = "false",

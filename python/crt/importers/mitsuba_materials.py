@@ -109,18 +109,22 @@ class Materials:
         made = self.index(plugin, "int_ior", inside) / max(self.index(plugin, "ext_ior", "air"), 1e-3)
         return float(f"{min(max(made, 1e-3), 1000):.9g}")
 
-    def widths(self, plugin, values, textured):
+    def widths(self, plugin, values):
         """The keys of crt's roughness."""
         if plugin.text("distribution", "beckmann") != "ggx":
             self.losses.add(plugin.place, "microfacets of Beckmann's distribution", WIDER)
         plugin.get("sample_visible")
         if plugin.has("alpha_u", "alpha_v"):
-            along = values.constant(plugin, "alpha_u", 0.1)
-            return spectra.anisotropic(along, values.constant(plugin, "alpha_v", 0.1))
-        made = values.number(plugin, "alpha", 0.1)
-        if not isinstance(made, dict):
-            return {"roughness": spectra.roughness(made)}
-        return {"roughness": self.rooted(plugin, made) if textured else 0.3}
+            along, across = (values.number(plugin, name, 0.1) for name in ("alpha_u", "alpha_v"))
+            made = along if isinstance(along, dict) else across
+            if not isinstance(made, dict):
+                return spectra.anisotropic(along, across)
+            if along != across:
+                self.losses.add(plugin.place, "two textures of roughness", "the first for both")
+        else:
+            made = values.number(plugin, "alpha", 0.1)
+        return {"roughness": self.rooted(plugin, made) if isinstance(made, dict)
+                else spectra.roughness(made)}
 
     def rooted(self, plugin, made):
         """A texture of widths as one of their square roots."""
@@ -130,10 +134,15 @@ class Materials:
         return 0.3 if roots is None else roots
 
     def factor(self, plugin, values, *names):
-        """A factor on what microfacets reflect or let through, which physical surfaces do not have."""
+        """A factor on what glass reflects or lets through: crt's has none."""
         for name in names:
             if plugin.has(name) and values.reflectance(plugin, name, 1.0) != 1:
                 self.losses.add(plugin.place, f"'{name}' of {plugin}", "1", large=True)
+
+    def tint(self, plugin, values, name):
+        """The key of such a factor on metals, gloss and panes."""
+        made = values.reflectance(plugin, name, 1.0) if plugin.has(name) else 1
+        return {} if made == 1 else {"tint": made}
 
     # By the names of Mitsuba.
 
@@ -171,18 +180,17 @@ class Materials:
         if metal is None:
             color = values.reflectance(plugin, "specular_reflectance", 1.0)
             return Surface({"type": "mirror", "reflectance": color})
-        self.factor(plugin, values, "specular_reflectance")
-        return Surface({"type": "conductor"} | metal)
+        return Surface({"type": "conductor"} | metal | self.tint(plugin, values, "specular_reflectance"))
 
     def of_roughconductor(self, plugin, values):
         metal = self.metal(plugin, values)
-        widths = self.widths(plugin, values, textured=True)
+        widths = self.widths(plugin, values)
         if metal is None:
             color = values.reflectance(plugin, "specular_reflectance", 1.0)
             return Surface(rough_mirror(color, widths))
-        self.factor(plugin, values, "specular_reflectance")
         self.losses.add(plugin.place, *ROUGH_METAL)
-        return Surface({"type": "rough_conductor"} | metal | widths)
+        return Surface({"type": "rough_conductor"} | metal | widths |
+                       self.tint(plugin, values, "specular_reflectance"))
 
     def of_dielectric(self, plugin, values):
         self.factor(plugin, values, "specular_reflectance", "specular_transmittance")
@@ -190,20 +198,21 @@ class Materials:
 
     def of_roughdielectric(self, plugin, values):
         self.factor(plugin, values, "specular_reflectance", "specular_transmittance")
-        widths = self.widths(plugin, values, textured=True)
+        widths = self.widths(plugin, values)
         return Surface({"type": "rough_dielectric", "ior": self.ior(plugin)} | widths, clear=True)
 
     def of_thindielectric(self, plugin, values):
-        self.factor(plugin, values, "specular_reflectance", "specular_transmittance")
-        return Surface({"type": "thin_dielectric", "ior": self.ior(plugin)}, clear=True)
+        self.factor(plugin, values, "specular_reflectance")
+        return Surface({"type": "thin_dielectric", "ior": self.ior(plugin)} |
+                       self.tint(plugin, values, "specular_transmittance"), clear=True)
 
     def of_plastic(self, plugin, values):
         ior = self.ior(plugin, "polypropylene")
-        self.factor(plugin, values, "specular_reflectance")
         color = values.reflectance(plugin, "diffuse_reflectance")
         if not plugin.get("nonlinear", False):
             color = self.linear(plugin, color, ior)
-        return Surface({"type": "plastic", "reflectance": color, "ior": min(max(ior, 1), 10)})
+        return Surface({"type": "plastic", "reflectance": color, "ior": min(max(ior, 1), 10)} |
+                       self.tint(plugin, values, "specular_reflectance"))
 
     def linear(self, plugin, color, ior):
         """The reflectance of crt's base, whose colour deepens as light goes to and fro below the coat, that
@@ -223,11 +232,11 @@ class Materials:
 
     def of_roughplastic(self, plugin, values):
         made = self.of_plastic(plugin, values)
-        widths = self.widths(plugin, values, textured=False)
-        if widths["roughness"] > 0.3:
+        rough = self.widths(plugin, values)["roughness"]
+        if isinstance(rough, dict) or rough > 0.3:
             self.losses.add(plugin.place, "the energy loss of a rough coat between its facets",
                             "a coat without energy loss")
-        return dataclasses.replace(made, content=made.content | {"roughness": widths["roughness"]})
+        return dataclasses.replace(made, content=made.content | {"roughness": rough})
 
     def of_pplastic(self, plugin, values):
         plugin.set("nonlinear", True, "boolean", plugin.place)
@@ -333,10 +342,6 @@ class Materials:
                 made[key] = weight if isinstance(weight, dict) else min(max(weight, 0.0), 1.0)
         clear = bool(made.get("transmission_weight", 0) != 0)
         pure = 1 in (made.get("base_metalness", 0), made.get("transmission_weight", 0))
-        if isinstance(rough, dict) and (not pure or "coat_weight" in made):
-            self.losses.add(plugin.place, "a texture of roughness on a material other than pure metal or "
-                                          "glass", "0.5")
-            made["specular_roughness"] = 0.5
         if aspect != 1 and (isinstance(rough, dict) or not pure):
             self.losses.add(plugin.place, "'anisotropic' on a material other than pure metal or glass", "0")
         elif aspect != 1:

@@ -114,12 +114,10 @@ class Materials:
         return 0.3 if powers is None else powers
 
     def single(self, found, widths):
-        """Roughness where crt has a number alone, the same in all directions."""
-        value = widths["roughness"]
-        if isinstance(value, dict) or len(widths) > 1:
-            self.losses.add(found.place, f"a texture or a direction of roughness of {found}",
-                            "one roughness")
-        return 0.3 if isinstance(value, dict) else value
+        """Roughness where crt's is the same in all directions."""
+        if len(widths) > 1:
+            self.losses.add(found.place, f"a direction of roughness of {found}", "one roughness")
+        return widths["roughness"]
 
     # By the names of pbrt.
 
@@ -169,8 +167,6 @@ class Materials:
 
     def of_coatedconductor(self, found):
         below = self.widths(found, "conductor.")
-        if isinstance(below["roughness"], dict):
-            below = {"roughness": self.single(found, below)}
         above = self.single(found, self.widths(found, "interface."))
         if found.has("reflectance"):
             color = self.values.reflectance(found, "reflectance", 0.5)
