@@ -130,6 +130,8 @@ struct Quadric {
 
 /// "a sphere"
 const char* wordOf(QuadricType type);
+/// Of its one side.
+double areaOf(const Quadric& shape);
 /// The factor by which a transform scales lengths; nothing if the scale depends on the direction.
 std::optional<double> evenScaleOf(const Matrix4d& transform);
 /// Of one that does: what is wrong with that, behind wordOf.

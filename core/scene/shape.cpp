@@ -3,6 +3,7 @@
 #include "base/vec3d.h"
 
 #include <cmath>
+#include <numbers>
 
 namespace crt {
 
@@ -13,6 +14,13 @@ const char* wordOf(QuadricType type) {
         case QuadricType::Cylinder: return "a cylinder";
     }
     return "";
+}
+
+double areaOf(const Quadric& shape) {
+    const double around = 2 * std::numbers::pi * shape.radius;
+    // Of a sphere a slice has the area of the cylinder around it (Archimedes).
+    return shape.type == QuadricType::Disk ? around * shape.radius / 2
+                                           : around * (shape.to_z - shape.from_z);
 }
 
 std::optional<double> evenScaleOf(const Matrix4d& m) {

@@ -1,7 +1,12 @@
 #include "scene/yaml/scene_materials.h"
 
+#include "scene/light_units.h"
+#include "scene/scene_limits.h"
+
 #include <fmt/format.h>
 
+#include <cmath>
+#include <numbers>
 #include <string_view>
 #include <tuple>
 
@@ -178,15 +183,51 @@ std::optional<std::int32_t> MaterialReader::find(const std::string& name, const 
     return std::nullopt;
 }
 
+/// The radiance of a surface, by whichever key says how bright it is.
+void MaterialReader::readBrightness(const SectionReader& light, const std::function<double()>& area_m2,
+                                    Emission& emission) {
+    if (std::optional<Spectrum> radiance = spectra_.read(light, "radiance", SpectrumUse::Emission)) {
+        emission.radiance = *std::move(radiance);
+        return;
+    }
+    const std::size_t errors = out_.count();
+    Spectrum spectrum = illuminantSpectrum("D65").value();
+    if (std::optional<Spectrum> given = spectra_.read(light, "spectrum", SpectrumUse::Emission))
+        spectrum = *std::move(given);
+    if (out_.count() != errors) return;
+    for (const char* key : {"luminance_cd_m2", "luminous_flux_lm", "power_w"}) {
+        double amount = 0;
+        if (!light.read(key, amount)) continue;
+        const std::string_view word = key;
+        double unit = word == "power_w" ? integralOverWavelengths(spectrum) : photometric(spectrum);
+        if (!(unit > 0))
+            return light.error(light.has("spectrum") ? "spectrum" : key,
+                               fmt::format("this spectrum has no light that '{}' measures", key));
+        if (word != "luminance_cd_m2") {
+            if (!area_m2)
+                return light.error(key, "the area of a part is not known when it is read",
+                                   "give 'luminance_cd_m2' or 'radiance'");
+            const double area = area_m2();
+            if (!(area > 0 && std::isfinite(area)))
+                return light.error(key, "the object has no area that this makes shine");
+            unit *= std::numbers::pi * area * (emission.two_sided ? 2 : 1);
+        }
+        const double factor = amount / unit;
+        if (!(factor * spectrum.max() <= kMostRadiance))
+            return light.error(key, "this is too bright for the area that emits");
+        emission.radiance = scaled(spectrum, factor);
+    }
+}
+
 std::optional<std::int32_t> MaterialReader::readEmission(const SectionReader& section, std::int32_t material,
-                                                       const std::string& material_name) {
+                                                         const std::string& material_name,
+                                                         const std::function<double()>& area_m2) {
     const std::optional<SectionReader> light =
         section.section("emission", fmt::format("the emission of {}", section.subject()));
     if (!light) return std::nullopt;
     Emission emission;
     light->read("two_sided", emission.two_sided);
-    if (std::optional<Spectrum> radiance = spectra_.read(*light, "radiance", SpectrumUse::Emission))
-        emission.radiance = *std::move(radiance);
+    readBrightness(*light, area_m2, emission);
     if (material >= 0 && scene_.materials[static_cast<std::size_t>(material)].emission >= 0)
         section.error("emission", fmt::format("material '{}' emits light already", material_name),
                       "leave 'emission' or the material's 'emission_luminance' out");

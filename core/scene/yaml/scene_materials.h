@@ -7,6 +7,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <optional>
 #include <string>
@@ -27,8 +28,10 @@ public:
     /// In the order of the file.
     const std::vector<std::string>& names() const { return names_; }
     /// Of a surface with the scene's material `material`, −1 none, that is called `material_name`.
+    /// `area_m2`: of what emits, each side once; empty where a flux cannot be given.
     std::optional<std::int32_t> readEmission(const SectionReader& section, std::int32_t material,
-                                             const std::string& material_name);
+                                             const std::string& material_name,
+                                             const std::function<double()>& area_m2);
     /// Warns about materials that no object uses.
     void finish() const;
 
@@ -42,6 +45,8 @@ private:
     void readThinFilm(const SectionReader& section, Material& material);
     /// A diffuse material that is rough is a plastic without a coat.
     static void makeRoughDiffuse(Material& material);
+    void readBrightness(const SectionReader& light, const std::function<double()>& area_m2,
+                        Emission& emission);
     void readAnisotropy(const SectionReader& section, Material& material) const;
     struct OpenPbr;
     /// Makes the material of what OpenPBR's keys say, and of further ones, which come before it.

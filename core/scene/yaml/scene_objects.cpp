@@ -56,6 +56,29 @@ double relativeVolume(const Matrix4d& m) {
     return dot(rows[0], cross(rows[1], rows[2]));
 }
 
+/// The area of what an emission of the object would make shine, of all its placements together: not of faces
+/// that emit by themselves.
+double emittingArea(const Scene& scene, const Object& object, const Mesh& mesh) {
+    double area = 0;
+    for (const Matrix4d& m : object.transforms) {
+        if (object.shape) {
+            const double scale = evenScaleOf(m).value_or(0);
+            area += areaOf(*object.shape) * scale * scale;
+            continue;
+        }
+        const auto edge = [&](std::size_t triangle, std::size_t to) {
+            const Vec3d d =
+                mesh.positions[mesh.triangles[triangle][to]] - mesh.positions[mesh.triangles[triangle][0]];
+            return Vec3d{m[0] * d[0] + m[1] * d[1] + m[2] * d[2], m[4] * d[0] + m[5] * d[1] + m[6] * d[2],
+                         m[8] * d[0] + m[9] * d[1] + m[10] * d[2]};
+        };
+        for (std::size_t i = 0; i < mesh.triangles.size(); ++i)
+            if (emissionIndexOf(scene, object, mesh, i) < 0)
+                area += 0.5 * length(cross(edge(i, 1), edge(i, 2)));
+    }
+    return area;
+}
+
 }  // namespace
 
 // ---- Placements -----------------------------------------------------------------------------------------
@@ -191,7 +214,11 @@ void ObjectReader::readObject(const YamlNode& node, const YamlPlace& place, std:
         if (material_given && !named) section.error("material", "only an OBJ has its own materials");
     }
     const std::optional<std::uint32_t> mesh = meshes_.read(section, material_name, object);
-    object.emission = materials_.readEmission(section, object.material, material_name).value_or(-1);
+    const auto area_m2 = [&] {
+        const double metres = scene_.metres_per_unit.value_or(1);
+        return mesh ? emittingArea(scene_, object, scene_.meshes[*mesh]) * metres * metres : 0;
+    };
+    object.emission = materials_.readEmission(section, object.material, material_name, area_m2).value_or(-1);
     if (mesh && !object.shape && scene_.meshes[*mesh].triangles.empty())
         return tellLeftOut(object, section.subject());
     object.mesh = mesh.value_or(0);

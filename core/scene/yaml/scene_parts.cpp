@@ -26,7 +26,7 @@ std::vector<PartUse> MeshReader::readMeshParts(const SectionReader& object) {
         std::string material;
         if (section.read("material", material))
             part.material = materials_.find(material, section.place("material"), false).value_or(-1);
-        part.emission = materials_.readEmission(section, part.material, material).value_or(-1);
+        part.emission = materials_.readEmission(section, part.material, material, {}).value_or(-1);
         if (!section.has("material") && !section.has("emission"))
             out_.error(entry.place,
                        fmt::format("{} has no effect: give it a 'material' or an 'emission'", subject));

@@ -57,81 +57,83 @@ KeySchema radianceKey(std::string doc) {
 KeySchema materialType(std::string word) { return schema::typeKey(std::move(word), "material"); }
 
 SectionSchema topLevel() {
-    return {"",
-            "the scene",
-            "A scene file is one YAML map. Every key but `crt` may be left out.",
-            {
-                {.name = "crt",
-                 .kind = Kind::Integer,
-                 .range = {1, 1, false, false},
-                 .required = true,
-                 .doc = "Version of the scene format, 1. Must be the first key."},
-                {.name = "include",
-                 .shape = Shape::OneOrList,
-                 .count_min = 1,
-                 .doc = "Scene files whose contents are added here; see [Shared "
-                        "parts](#shared-parts)."},
-                {.name = "title",
-                 .doc = "The title of the scene. crt writes it into image metadata and the "
-                        "report."},
-                {.name = "unit",
-                 .kind = Kind::Choice,
-                 .choices = lengthUnitNames(),
-                 .fallback = "m",
-                 .doc = "The length of one scene unit, which holds for the camera, meshes and their files, "
-                        "transforms, and `absorption`. These numbers stay as they are written. "
-                        "The unit matters to lights without a surface, whose watts, lumens and candelas "
-                        "spread over square metres: with `mm`, a light at distance 2000 is 2 m away. "
-                        "Radiance, irradiance, luminance and illuminance do not depend on it. An included "
-                        "file that gives another unit is an error."},
-                {.name = "camera", .kind = Kind::Section, .section = "camera", .doc = "The viewpoint."},
-                {.name = "film",
-                 .kind = Kind::Section,
-                 .section = "film",
-                 .doc = "The image: size, "
-                        "filter, colour."},
-                {.name = "integrator",
-                 .kind = Kind::Section,
-                 .section = "integrator",
-                 .doc = "The algorithm that computes light."},
-                {.name = "sampler",
-                 .kind = Kind::Section,
-                 .section = "sampler",
-                 .doc = "Random numbers, and how many samples."},
-                {.name = "spectra",
-                 .kind = Kind::Spectrum,
-                 .shape = Shape::Map,
-                 .doc = "Named spectra. A name may be used wherever a spectrum is expected."},
-                {.name = "materials",
-                 .kind = Kind::Section,
-                 .shape = Shape::Map,
-                 .section = "material",
-                 .doc = "Named materials, used by objects."},
-                {.name = "objects",
-                 .kind = Kind::Section,
-                 .shape = Shape::List,
-                 .section = "object",
-                 .fallback = "[]",
-                 .doc = "The geometry."},
-                {.name = "lights",
-                 .kind = Kind::Section,
-                 .shape = Shape::List,
-                 .section = "light",
-                 .fallback = "[]",
-                 .doc = "Lights without a surface. Objects shine by their `emission`."},
-                {.name = "environment",
-                 .kind = Kind::Section,
-                 .section = "environment",
-                 .fallback = "null",
-                 .nullable = true,
-                 .doc = "Light from infinitely far away; `null` is darkness."},
-                {.name = "outputs",
-                 .kind = Kind::Section,
-                 .shape = Shape::List,
-                 .section = "output",
-                 .fallback = "[]",
-                 .doc = "Files to write."},
-            }};
+    return {
+        "",
+        "the scene",
+        "A scene file is one YAML map. Every key but `crt` may be left out.",
+        {
+            {.name = "crt",
+             .kind = Kind::Integer,
+             .range = {1, 1, false, false},
+             .required = true,
+             .doc = "Version of the scene format, 1. Must be the first key."},
+            {.name = "include",
+             .shape = Shape::OneOrList,
+             .count_min = 1,
+             .doc = "Scene files whose contents are added here; see [Shared "
+                    "parts](#shared-parts)."},
+            {.name = "title",
+             .doc = "The title of the scene. crt writes it into image metadata and the "
+                    "report."},
+            {.name = "unit",
+             .kind = Kind::Choice,
+             .choices = lengthUnitNames(),
+             .fallback = "m",
+             .doc = "The length of one scene unit, which holds for the camera, meshes and their files, "
+                    "transforms, and `absorption`. These numbers stay as they are written. "
+                    "The unit matters to lights without a surface, whose watts, lumens and candelas "
+                    "spread over square metres, and to watts and lumens of surfaces: with `mm`, a light at "
+                    "distance 2000 is 2 m away. "
+                    "Radiance, irradiance, luminance and illuminance do not depend on it. An included "
+                    "file that gives another unit is an error."},
+            {.name = "camera", .kind = Kind::Section, .section = "camera", .doc = "The viewpoint."},
+            {.name = "film",
+             .kind = Kind::Section,
+             .section = "film",
+             .doc = "The image: size, "
+                    "filter, colour."},
+            {.name = "integrator",
+             .kind = Kind::Section,
+             .section = "integrator",
+             .doc = "The algorithm that computes light."},
+            {.name = "sampler",
+             .kind = Kind::Section,
+             .section = "sampler",
+             .doc = "Random numbers, and how many samples."},
+            {.name = "spectra",
+             .kind = Kind::Spectrum,
+             .shape = Shape::Map,
+             .doc = "Named spectra. A name may be used wherever a spectrum is expected."},
+            {.name = "materials",
+             .kind = Kind::Section,
+             .shape = Shape::Map,
+             .section = "material",
+             .doc = "Named materials, used by objects."},
+            {.name = "objects",
+             .kind = Kind::Section,
+             .shape = Shape::List,
+             .section = "object",
+             .fallback = "[]",
+             .doc = "The geometry."},
+            {.name = "lights",
+             .kind = Kind::Section,
+             .shape = Shape::List,
+             .section = "light",
+             .fallback = "[]",
+             .doc = "Lights without a surface. Objects shine by their `emission`."},
+            {.name = "environment",
+             .kind = Kind::Section,
+             .section = "environment",
+             .fallback = "null",
+             .nullable = true,
+             .doc = "Light from infinitely far away; `null` is darkness."},
+            {.name = "outputs",
+             .kind = Kind::Section,
+             .shape = Shape::List,
+             .section = "output",
+             .fallback = "[]",
+             .doc = "Files to write."},
+        }};
 }
 
 SectionSchema camera() {
@@ -1026,17 +1028,37 @@ void addObjects(std::vector<SectionSchema>& all) {
            .count_max = 16,
            .required = true,
            .doc = "Four rows of four, points as columns, last row 0 0 0 1; must be invertible."}}});
-    all.push_back({"emission",
-                   "an emission",
-                   "",
-                   {radianceKey("Emitted equally in all directions. The brightest light of a scene must "
-                                "reach 1e-25: below that, paths would lose it to rounding. A light must not "
-                                "lie in the plane of another surface that it overlaps: rounding decides "
-                                "which of them is seen, and crt warns."),
-                    {.name = "two_sided",
-                     .kind = Kind::Boolean,
-                     .fallback = yaml(Emission{}.two_sided),
-                     .doc = "True if the back side emits too."}}});
+    KeySchema radiance = radianceKey(
+        "Emitted equally in all directions. The brightest light of a scene must "
+        "reach 1e-25: below that, paths would lose it to rounding. A light must not "
+        "lie in the plane of another surface that it overlaps: rounding decides "
+        "which of them is seen, and crt warns.");
+    radiance.required = false;
+    const auto amount = [](const char* name, const char* unit, const char* doc) {
+        return KeySchema{
+            .name = name, .kind = Kind::Number, .range = kNotNegative, .unit = unit, .doc = doc};
+    };
+    all.push_back(
+        {"emission",
+         "an emission",
+         "",
+         {radiance,
+          amount("luminance_cd_m2", "cd/m²", "Or its luminance."),
+          amount("luminous_flux_lm", "lm",
+                 "Or the luminous flux of the whole object, all its placements and both sides "
+                 "together. Not of a part."),
+          amount("power_w", "W", "Or its radiant flux, from 360 to 830 nm. Not of a part."),
+          {.name = "spectrum",
+           .kind = Kind::Spectrum,
+           .range = kRadiance,
+           .fallback = "{illuminant: D65}",
+           .doc = "The colour, where one of these amounts says how bright it is."},
+          {.name = "two_sided",
+           .kind = Kind::Boolean,
+           .fallback = yaml(Emission{}.two_sided),
+           .doc = "True if the back side emits too."}},
+         {{KeyRule::Kind::ExactlyOne, {"radiance", "luminance_cd_m2", "luminous_flux_lm", "power_w"}},
+          {KeyRule::Kind::AtMostOne, {"spectrum", "radiance"}}}});
 }
 
 void addOutside(std::vector<SectionSchema>& all) {
