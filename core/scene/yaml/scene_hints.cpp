@@ -1,7 +1,5 @@
 #include "scene/yaml/scene_hints.h"
 
-#include "scene/light_units.h"
-
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -22,14 +20,6 @@ struct ForeignWords {
     std::string hint;
 };
 
-/// Of area lights: crt has their radiance, and lamps are bought by lumens.
-std::string lumensHint() {
-    return fmt::format(
-        "a luminance of L cd/m2 is 'radiance: {{illuminant: D65, scale: L / {:.0f}}}'; a "
-        "light of F lm and A m2, shining on one side, has L = F / (pi A)",
-        luminanceOfUnitY_cd_m2());
-}
-
 const std::vector<ForeignWords>& foreignWords() {
     static const std::vector<ForeignWords> all{
         {{"sphere", "disk", "cylinder", "rectangle", "box"},
@@ -48,10 +38,10 @@ const std::vector<ForeignWords>& foreignWords() {
         {{"material/conductor"}, {"roughness"}, "a smooth metal has none: write type: rough_conductor"},
         {{"material/dielectric"}, {"roughness"}, "smooth glass has none: write type: rough_dielectric"},
         {{"emission"},
-         {"luminous_flux_lm", "luminous_flux", "lumens", "lm", "luminance", "luminance_cd_m2", "power_w"},
-         lumensHint()},
+         {"luminous_flux", "lumens", "lm", "luminance", "nits", "power", "watts"},
+         "its brightness is 'luminous_flux_lm', 'luminance_cd_m2' or 'power_w'"},
         {{"emission"},
-         {"color", "colour", "intensity", "strength", "power", "spectrum"},
+         {"color", "colour", "intensity", "strength"},
          "'radiance' sets its brightness and colour"},
         {{"camera"}, {"look_at", "lookat", "lookAt", "to"}, "'target' is the point it looks at"},
         {{"camera"}, {"from", "eye", "origin", "location"}, "'position' is the point it looks from"},
@@ -198,10 +188,9 @@ std::string hintOfMissingMap(const SectionSchema& section, const YamlNode& node)
     const std::vector<const KeySchema*> keys = mainKeys(section);
     // A path is text, and a name of a spectrum has no dot: the image of an environment before its radiance.
     const bool is_path = node.kind == YamlKind::Scalar && node.text.find('.') != std::string::npos;
-    for (const ValueKind first : {is_path ? ValueKind::Text : ValueKind::Number, ValueKind::Spectrum,
-                                  ValueKind::Number, ValueKind::Text})
+    for (const bool text_alone : {is_path, false})
         for (const KeySchema* key : keys) {
-            if (key->kind != first) continue;
+            if (text_alone && key->kind != ValueKind::Text) continue;
             if (takes(*key, node)) return fmt::format("write {{{}: {}}}", key->name, textOf(node));
             if (key->kind == ValueKind::Spectrum && isThreeNumbers(node))
                 return fmt::format("write {{{}: {}}}", key->name, rgbMap(node));
