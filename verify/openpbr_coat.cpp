@@ -24,11 +24,6 @@ std::string under(const Lacquer& coat, const std::string& base, double weight = 
                        base, weight, coat.color, coat.roughness, coat.ior, coat.darkening);
 }
 
-/// The roughness of a metal or a gloss under a rough coat, by the specification.
-double widened(double base, double coat) {
-    return std::pow(std::min(1.0, std::pow(base, 4) + 2 * std::pow(coat, 4)), 0.25);
-}
-
 /// Coats on Lambert's law, lit by beams.
 void beamsOnCoats(Context& context) {
     const Vec3d view = unit({0.6, 0.2, 0.5});

@@ -59,6 +59,9 @@ double roughConductorAlbedo(double cosine, double n, double k, double roughness)
 /// a dip that leaves `tint` of it at the cosine 1/7.
 double f82Tint(double cosine, double f0, double tint);
 
+/// The roughness of a metal or a gloss under a rough coat, by OpenPBR Surface 1.1.
+double widened(double base, double coat);
+
 /// As roughConductorAlbedo, of a metal that reflects `weight` times that.
 double tintedMetalAlbedo(double cosine, double f0, double tint, double weight, double roughness);
 

@@ -27,6 +27,10 @@ double eonRounds(double rho, double lost) { return rho * rho * (1 - lost) / (1 -
 
 }  // namespace
 
+double widened(double base, double coat) {
+    return std::pow(std::min(1.0, std::pow(base, 4) + 2 * std::pow(coat, 4)), 0.25);
+}
+
 double eonReflection(const Vec3d& view, const Vec3d& light, double rho, double r) {
     const double mean = (1 + kEonMean * r) / (1 + kEonLeast * r);
     const double once = rho * fujii(view, light, r) / (1 + kEonLeast * r);

@@ -25,17 +25,6 @@ struct ByPlace {
     std::string text() const { return fmt::format("{{checker: [{}, {}]}}", here, elsewhere); }
 };
 
-/// A floor under light from everywhere, seen from an angle to its normal, in the middle of a square.
-std::string checkered(const std::string& material, double degrees) {
-    return Stage(eyeAt({std::sin(degrees * kDegree), std::cos(degrees * kDegree), 0}, "[0, 0, 1]"))
-        .material("it", material)
-        .object(
-            "mesh: {positions: [[-2,0,-2],[-2,0,2],[2,0,2],[2,0,-2]], uvs: [[-1.5,-1.5],[-1.5,2.5],"
-            "[2.5,2.5],[2.5,-1.5]], faces: [[0,1,2,3]]}, material: it")
-        .set("environment", "{radiance: 1}")
-        .yaml();
-}
-
 std::string plasticOf(double base, const std::string& roughness) {
     return fmt::format("{{type: plastic, reflectance: {}, roughness: {}}}", base, roughness);
 }
@@ -53,12 +42,13 @@ void glosses(Context& context, double degrees) {
     for (const ByPlace& rough : kGlosses) {
         context.estimate(fmt::format("plastic of roughness {} here, {} elsewhere, at {}°", rough.here,
                                      rough.elsewhere, degrees),
-                         checkered(plasticOf(0.5, rough.text()), degrees), meanRadiance,
+                         checkeredFloor(plasticOf(0.5, rough.text()), degrees), meanRadiance,
                          plasticAlbedo(cosine, 0.5, kGlossIndex, rough.here), 2e-3, kEffort,
                          {{0.5, "there is no coat"}});
         context.estimate(fmt::format("white plastic of roughness {} here, {} elsewhere, at {}°", rough.here,
                                      rough.elsewhere, degrees),
-                         checkered(plasticOf(1, rough.text()), degrees), meanRadiance, 1, 2e-3, kEffort);
+                         checkeredFloor(plasticOf(1, rough.text()), degrees), meanRadiance, 1, 2e-3,
+                         kEffort);
     }
     // Of a black base the gloss alone is seen.
     for (const ByPlace& rough : kGlosses) {
@@ -66,16 +56,13 @@ void glosses(Context& context, double degrees) {
             return microfacetShares(cosine, kGlossIndex, roughness).reflected;
         };
         context.estimate(fmt::format("gloss of roughness {} on black, at {}°", rough.here, degrees),
-                         checkered(plasticOf(0, rough.text()), degrees), meanRadiance, gloss(rough.here),
-                         5e-3, kEffort, {{0, "there is no gloss"}});
+                         checkeredFloor(plasticOf(0, rough.text()), degrees), meanRadiance,
+                         gloss(rough.here), 5e-3, kEffort, {{0, "there is no gloss"}});
     }
 }
 
 void coats(Context& context, double degrees) {
     const double cosine = std::cos(degrees * kDegree);
-    const auto widened = [](double base, double coat) {
-        return std::pow(std::min(1.0, std::pow(base, 4) + 2 * std::pow(coat, 4)), 0.25);
-    };
     for (const auto& [base, coat] : {std::pair{ByPlace{0.3, 0.7}, ByPlace{0.55, 0.1}},
                                      {ByPlace{0.1, 0.1}, ByPlace{0.8, 0.2}},
                                      {ByPlace{0.2, 0.9}, ByPlace{0.4, 0.4}}}) {
@@ -88,11 +75,11 @@ void coats(Context& context, double degrees) {
         context.estimate(
             fmt::format("metal of roughness {} under a coat of roughness {}, at {}°", base.here, coat.here,
                         degrees),
-            checkered(coated(fmt::format("base_color: 0.6, base_metalness: 1, specular_color: 0.3, "
-                                         "specular_weight: 0.9, specular_roughness: {}",
-                                         base.text()),
-                             coat.text()),
-                      degrees),
+            checkeredFloor(coated(fmt::format("base_color: 0.6, base_metalness: 1, specular_color: 0.3, "
+                                              "specular_weight: 0.9, specular_roughness: {}",
+                                              base.text()),
+                                  coat.text()),
+                           degrees),
             meanRadiance, on_metal(widened(base.here, coat.here)), 2e-3, kEffort,
             {{(1 - gloss) * lacquer.darkened(cosine, 0.9 * 0.6) *
                   tintedMetalAlbedo(cosine, 0.6, 0.3, 0.9, base.here),
@@ -111,11 +98,11 @@ void coats(Context& context, double degrees) {
         };
         context.estimate(
             fmt::format("gloss, roughness {} under a coat of {}, at {}°", base.here, coat.here, degrees),
-            checkered(coated(fmt::format("base_color: 0.5, specular_ior: 2.4, "
-                                         "specular_roughness: {}",
-                                         base.text()),
-                             coat.text()),
-                      degrees),
+            checkeredFloor(coated(fmt::format("base_color: 0.5, specular_ior: 2.4, "
+                                              "specular_roughness: {}",
+                                              base.text()),
+                                  coat.text()),
+                           degrees),
             meanRadiance, on_gloss(std::lerp(1.0, base.here, f0)), 2e-3, kEffort,
             {{on_gloss(base.here), "the base counts as rough as its gloss"}});
         for (const char* white :
@@ -123,8 +110,9 @@ void coats(Context& context, double degrees) {
             context.estimate(
                 fmt::format("{}, of roughness {} under a coat of roughness {}, at {}°", white, base.here,
                             coat.here, degrees),
-                checkered(coated(fmt::format("{}, specular_roughness: {}", white, base.text()), coat.text()),
-                          degrees),
+                checkeredFloor(
+                    coated(fmt::format("{}, specular_roughness: {}", white, base.text()), coat.text()),
+                    degrees),
                 meanRadiance, 1, 2e-3, kEffort);
     }
 }
@@ -137,8 +125,8 @@ void roughByPlace(Context& context) {
     }
     // On a table a texture says what a number says.
     const auto same = [&](const char* what, const std::string& by_place, const std::string& by_number) {
-        context.sameBits(what, context.render(checkered(by_place, 40)),
-                         context.render(checkered(by_number, 40)),
+        context.sameBits(what, context.render(checkeredFloor(by_place, 40)),
+                         context.render(checkeredFloor(by_number, 40)),
                          "a texture of one roughness gives different bits");
     };
     same("plastic", plasticOf(0.5, ByPlace{0.5625, 0.5625}.text()), plasticOf(0.5, "0.5625"));

@@ -18,23 +18,6 @@ namespace {
 constexpr double kPaneIndex = 1.5;
 constexpr Effort kTintEffort{.samples = 256, .most = 65536};
 
-/// A square around the origin with normal +y, on which (u, v) is (0.5, 0.5) at the origin.
-std::string squareOf(const std::string& material, double height, double half) {
-    return fmt::format(
-        "mesh: {{positions: [[-{1},{0},-{1}],[-{1},{0},{1}],[{1},{0},{1}],[{1},{0},-{1}]], uvs: "
-        "[[-1.5,-1.5],[-1.5,2.5],[2.5,2.5],[2.5,-1.5]], faces: [[0,1,2,3]]}}, material: {2}",
-        height, half, material);
-}
-
-/// In light from everywhere, from an angle to the normal.
-std::string seenFrom(const std::string& material, double degrees) {
-    return Stage(eyeAt({std::sin(degrees * kDegree), std::cos(degrees * kDegree), 0}, "[0, 0, 1]"))
-        .material("it", material)
-        .object(squareOf("it", 0, 2))
-        .set("environment", "{radiance: 1}")
-        .yaml();
-}
-
 /// The first value is where it is seen.
 constexpr const char* kForms[] = {"0.6", "{checker: [0.6, 0.1]}"};
 constexpr double kTint = 0.6;
@@ -43,15 +26,16 @@ void mirrors(Context& context, const char* tint, double degrees) {
     const double cosine = std::cos(degrees * kDegree);
     const auto seen = [&](const std::string& material, double expected, double plain) {
         context.estimate(fmt::format("{} of tint {}, at {}°", material, tint, degrees),
-                         seenFrom(fmt::format("{{{}, tint: {}}}", material, tint), degrees), meanRadiance,
-                         expected, 2e-3, kTintEffort, {{plain, "there is no tint"}});
+                         checkeredFloor(fmt::format("{{{}, tint: {}}}", material, tint), degrees),
+                         meanRadiance, expected, 2e-3, kTintEffort, {{plain, "there is no tint"}});
     };
     seen("type: conductor, eta: 1, k: 1e6", kTint, 1);
     const double rough = tintedMetalAlbedo(cosine, 1, 1, kTint, 0.7);
     context.estimate(
         fmt::format("a rough metal of tint {}, at {}°", tint, degrees),
-        seenFrom(fmt::format("{{type: rough_conductor, eta: 1, k: 1e6, roughness: 0.7, tint: {}}}", tint),
-                 degrees),
+        checkeredFloor(
+            fmt::format("{{type: rough_conductor, eta: 1, k: 1e6, roughness: 0.7, tint: {}}}", tint),
+            degrees),
         meanRadiance, rough, 2e-3, kTintEffort,
         {{1, "there is no tint"}, {kTint, "light that several facets reflect has the tint of one"}});
     for (const double roughness : {0.0, 0.5}) {
@@ -68,7 +52,7 @@ void panes(Context& context, const char* tint, double degrees) {
     const double cosine = std::cos(degrees * kDegree);
     const double passed = paneTransmittance(cosine, kPaneIndex);
     const std::string pane = fmt::format("{{type: thin_dielectric, ior: 1.5, tint: {}}}", tint);
-    context.estimate(fmt::format("a pane of tint {}, at {}°", tint, degrees), seenFrom(pane, degrees),
+    context.estimate(fmt::format("a pane of tint {}, at {}°", tint, degrees), checkeredFloor(pane, degrees),
                      meanRadiance, 1 - passed + kTint * passed, 2e-3, kTintEffort,
                      {{1, "there is no tint"}, {kTint, "the pane mirrors by its tint, too"}});
     const auto floor = [&](bool under) {
@@ -80,7 +64,7 @@ void panes(Context& context, const char* tint, double degrees) {
                                        "1}}]",
                                        -std::sin(degrees * kDegree), -cosine));
         // Above the eye; the light crosses it where the checkerboard has its first value.
-        if (under) stage.object(squareOf("pane", 0.3, 20));
+        if (under) stage.object(checkeredSquare("pane", 0.3, 20));
         return luminance(context.render(stage.yaml(), {.samples = 16}));
     };
     context.relative(fmt::format("a floor under a pane of tint {}, lit from {}°", tint, degrees),
@@ -99,8 +83,9 @@ void tints(Context& context) {
     // Each wavelength has its own.
     context.estimate(
         "a green mirror over a grey one",
-        {seenFrom("{type: conductor, eta: 1, k: 1e6, tint: {table: {nm: [360, 830], value: [0, 1]}}}", 0),
-         seenFrom("{type: conductor, eta: 1, k: 1e6}", 0)},
+        {checkeredFloor("{type: conductor, eta: 1, k: 1e6, tint: {table: {nm: [360, 830], value: [0, 1]}}}",
+                        0),
+         checkeredFloor("{type: conductor, eta: 1, k: 1e6}", 0)},
         [](const std::vector<Film>& films) { return luminance(films[0]) / luminance(films[1]); },
         [] {
             double seen = 0, all = 0;
@@ -111,9 +96,9 @@ void tints(Context& context) {
             return seen / all;
         }(),
         2e-3, kTintEffort, {{0.5, "the tint is the mean of its wavelengths"}});
-    context.sameBits("a tint of 1",
-                     context.render(seenFrom("{type: plastic, reflectance: 0.5, tint: 1}", 40)),
-                     context.render(seenFrom("{type: plastic, reflectance: 0.5}", 40)), "white is a tint");
+    context.sameBits(
+        "a tint of 1", context.render(checkeredFloor("{type: plastic, reflectance: 0.5, tint: 1}", 40)),
+        context.render(checkeredFloor("{type: plastic, reflectance: 0.5}", 40)), "white is a tint");
 }
 
 }  // namespace

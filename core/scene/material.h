@@ -56,8 +56,6 @@ struct Clearcoat {
     double base_share = 1;
     /// True if the material's own roughness is that without the coat, to which each vertex adds the coat's.
     bool roughens = false;
-
-    bool isRough() const { return roughness > 0 || roughness_texture != kNoTexture; }
 };
 
 struct Material {

@@ -37,12 +37,12 @@ void MaterialReader::readMaterial(const YamlEntry& entry) {
     const auto take = [&](std::string_view key, SpectrumUse use, Spectrum& into) {
         if (std::optional<Spectrum> s = spectra_.read(*section, key, use)) into = *std::move(s);
     };
-    const auto takeReflectance = [&] {
-        if (TextureReader::isTexture(*section, "reflectance"))
-            material.reflectance_texture =
-                textures_.read(*section, "reflectance", TexelKind::Spectra).value_or(kNoTexture);
-        else
-            take("reflectance", SpectrumUse::Reflectance, material.reflectance);
+    const auto takeColor = [&](std::string_view key, auto& into, TextureIndex& texture) {
+        if (section->schema().find(key) == nullptr) return;
+        if (TextureReader::isTexture(*section, key))
+            texture = textures_.read(*section, key, TexelKind::Spectra).value_or(kNoTexture);
+        else if (std::optional<Spectrum> s = spectra_.read(*section, key, SpectrumUse::Reflectance))
+            into = *std::move(s);
     };
     const auto takeNumber = [&](std::string_view key, double& number, TextureIndex& texture) {
         const bool textured = section->schema().find(key)->section == "texture";
@@ -77,14 +77,8 @@ void MaterialReader::readMaterial(const YamlEntry& entry) {
     if (is_diffuse) section->read("roughness", material.diffuse_roughness);
     else if (section->schema().find("roughness") != nullptr)
         takeNumber("roughness", material.roughness, material.roughness_texture);
-    if (section->schema().find("reflectance") != nullptr) takeReflectance();
-    if (section->schema().find("tint") != nullptr) {
-        if (TextureReader::isTexture(*section, "tint"))
-            material.tint_texture =
-                textures_.read(*section, "tint", TexelKind::Spectra).value_or(kNoTexture);
-        else
-            material.tint = spectra_.read(*section, "tint", SpectrumUse::Reflectance);
-    }
+    takeColor("reflectance", material.reflectance, material.reflectance_texture);
+    takeColor("tint", material.tint, material.tint_texture);
     for (const auto& [key, member] : kMaterialNumbers)
         if (section->schema().find(key) != nullptr) section->read(key, material.*member);
     switch (material.type) {

@@ -80,6 +80,7 @@ struct MaterialReader::OpenPbr {
 private:
     void number(const char* key, Weight& into) const;
     void color(const char* key, Spectrum& into) const;
+    void color(const char* key, Spectrum& into, TextureIndex& texture) const;
     bool hasVaryingGloss() const {
         return roughness.isTextured() || (coat.mayBeAbove0() && coat_roughness.isTextured());
     }
@@ -114,21 +115,20 @@ void MaterialReader::OpenPbr::color(const char* key, Spectrum& into) const {
         into = *std::move(s);
 }
 
+void MaterialReader::OpenPbr::color(const char* key, Spectrum& into, TextureIndex& texture) const {
+    if (TextureReader::isTexture(section, key))
+        texture = reader.textures_.read(section, key, TexelKind::Spectra).value_or(kNoTexture);
+    else
+        color(key, into);
+}
+
 void MaterialReader::OpenPbr::read() {
     section.read("base_weight", base_weight);
-    if (TextureReader::isTexture(section, "base_color"))
-        base_texture =
-            reader.textures_.read(section, "base_color", TexelKind::Spectra).value_or(kNoTexture);
-    else
-        color("base_color", base_color);
+    color("base_color", base_color, base_texture);
     section.read("base_diffuse_roughness", diffuse_roughness);
     number("base_metalness", metalness);
     section.read("specular_weight", specular_weight);
-    if (TextureReader::isTexture(section, "specular_color"))
-        specular_texture =
-            reader.textures_.read(section, "specular_color", TexelKind::Spectra).value_or(kNoTexture);
-    else
-        color("specular_color", specular_color);
+    color("specular_color", specular_color, specular_texture);
     number("specular_roughness", roughness);
     section.read("specular_roughness_anisotropy", like.anisotropy);
     section.read("anisotropy_rotation_deg", like.anisotropy_rotation_deg);
