@@ -1,5 +1,7 @@
 /// All kinds of materials, and a surface of each at which tests scatter light. A new material is a line in
 /// subjects().
+///
+/// Over 450 lines: the list of materials, a line each, with the truth about each.
 #pragma once
 
 #include "kernel_test.h"
@@ -106,6 +108,12 @@ inline Material tinted(Material m, double tint) {
 inline Material varying(Material m, crt::TextureIndex twentieths) {
     m.roughness = 0.9;
     m.roughness_texture = twentieths;
+    return m;
+}
+
+/// A thin sheet.
+inline Material sheet(Material m, double transmittance) {
+    m.transmittance = crt::constantSpectrum(transmittance);
     return m;
 }
 
@@ -331,6 +339,18 @@ inline std::vector<Subject> subjects() {
              return coated(0.6, 0.5)(cosine) -
                     0.7 * crt::verify::microfacetShares(std::abs(cosine), 1.5, 0.5).reflected;
          }},
+        {"paper", sheet(plastic(0.4, 0, 1), 0.5), constant(0.9)},
+        {"white paper", sheet(plastic(0.25, 0, 1), 0.75), constant(1)},
+        {"what lets all light through", sheet(plastic(0, 0, 1), 1), constant(1)},
+        {"a leaf", sheet(plastic(0.2, 0), 0.4), coated(0.6, 0), coat},
+        {"a white leaf", sheet(plastic(0.5, 0), 0.5), constant(1), coat},
+        {"a satin leaf", sheet(plastic(0.4, 0.5), 0.2), coated(0.6, 0.5)},
+        {"a white satin leaf", sheet(plastic(0.1, 0.7), 0.9), constant(1)},
+        {"a leaf by its colours", sheet(glossy(0.35, 0.35), 0.25), of_gloss(0.6, 0.35)},
+        {"a leaf, rough by place", sheet(varying(plastic(0.2, 0), 7), 0.4), coated(0.6, 0.35)},
+        {"a tinted leaf", sheet(tinted(plastic(0.2, 0), 0.3), 0.4),
+         [=](double cosine) { return coated(0.6, 0)(cosine) - 0.7 * coat(cosine); },
+         [=](double cosine) { return 0.3 * coat(cosine); }},
         {"plastic, rough by place", varying(plastic(0.6, 0), 7), coated(0.6, 0.35)},
         {"white plastic, rough by place", varying(plastic(1, 0), 13), constant(1)},
         {"plastic, polished by place", varying(plastic(0.6, 0), 0), coated(0.6, 0), coat},

@@ -138,6 +138,8 @@ struct Case {
     bool instanced = false;
     bool varying = false;
     bool tinted = false;
+    bool sheets = false;
+    bool screens = false;
 };
 
 const char* const kPointLights = R"(lights:
@@ -467,6 +469,42 @@ void addTints(crt::Scene& scene) {
     }
 }
 
+/// Diffuse and plastic surfaces become sheets, bare, glossy or rough, of numbers and of an image in turn.
+void addSheets(crt::Scene& scene) {
+    addUvs(scene);
+    crt::Texture colors;
+    colors.image = randomImage(6, 5, crt::TexelKind::Spectra);
+    scene.textures.push_back(colors);
+    const auto index = static_cast<crt::TextureIndex>(scene.textures.size() - 1);
+    int number = 0;
+    for (crt::Material& m : scene.materials) {
+        if (m.type != crt::MaterialType::Diffuse && m.type != crt::MaterialType::Plastic) continue;
+        if (m.type == crt::MaterialType::Diffuse) m.eta = crt::constantSpectrum(number % 2 == 0 ? 1 : 1.375);
+        m.type = crt::MaterialType::Plastic;
+        m.roughness = number % 3 == 0 ? 0.4 : 0;
+        m.diffuse_roughness = 0;
+        if (number % 2 == 1) m.transmittance_texture = index;
+        else m.transmittance = crt::constantSpectrum(0.375);
+        m.by_color = number++ % 4 == 3;
+    }
+}
+
+/// All that emits shows an image, tables of radiance times texels; another image is times a spectrum.
+void addScreens(crt::Scene& scene) {
+    addUvs(scene);
+    crt::Texture picture;
+    picture.image = randomImage(12, 9, crt::TexelKind::Spectra);
+    for (crt::Emission& emission : scene.emissions) {
+        picture.factor = crt::TextureValue{emission.radiance, crt::kNoTexture};
+        emission.texture = static_cast<crt::TextureIndex>(scene.textures.size());
+        scene.textures.push_back(picture);
+    }
+    picture.factor = crt::TextureValue{scene.materials[1].reflectance, crt::kNoTexture};
+    picture.wrap = crt::TextureWrap::Mirror;
+    scene.materials[0].reflectance_texture = static_cast<crt::TextureIndex>(scene.textures.size());
+    scene.textures.push_back(picture);
+}
+
 /// Shapes of every kind, whole and in part, from outside and from inside, one material each; some shine.
 void addShapes(crt::Scene& scene) {
     const auto empty = static_cast<std::uint32_t>(scene.meshes.size());
@@ -605,6 +643,12 @@ const Case kCases[] = {
     {.integrator = "{max_depth: 6, accelerator: bvh}", .sampler = "{type: independent}", .camera_extra = "",
      .filter = "box", .sampled_environment = true, .more = kPointLights, .shaped = true, .instanced = true,
      .varying = true},
+    {.integrator = "{max_depth: 8}", .sampler = "{type: sobol}", .camera_extra = "", .filter = "box",
+     .more = kPointLights, .sheets = true, .screens = true},
+    {.integrator = "{max_depth: 6, accelerator: bvh}", .sampler = "{type: independent}", .camera_extra = "",
+     .filter = "box", .sampled_environment = true, .mapped = true, .instanced = true, .sheets = true},
+    {.integrator = "{max_depth: 6, mis: false}", .sampler = "{type: xorshift}", .camera_extra = "",
+     .filter = "box", .composed = true, .many_lights = true, .screens = true},
 };
 
 /// A room that needs little of the kernel, so that the lean kernel is another than the full one also where
@@ -651,6 +695,8 @@ crt::Scene sceneOf(const Case& c) {
     if (c.coated) addCoats(scene);
     if (c.varying) addVaryingGloss(scene);
     if (c.tinted) addTints(scene);
+    if (c.sheets) addSheets(scene);
+    if (c.screens) addScreens(scene);
     if (c.instanced) addInstances(scene);
     return scene;
 }
@@ -698,7 +744,10 @@ std::vector<Named> conformance::allScenes() {
                                  "splats, eight replicates, tree, sobol",
                                  "gloss and coats of varying roughness, tints",
                                  "tints, films, glassware, point lights",
-                                 "varying gloss, shapes, instances, tree, independent"};
+                                 "varying gloss, shapes, instances, tree, independent",
+                                 "sheets, screens, point lights",
+                                 "sheets, normal maps, instances, tree, independent",
+                                 "screens, many lights, mixes and holes, light sampling alone"};
     static_assert(std::size(names) == std::size(kCases));
     std::vector<Named> all;
     for (std::size_t i = 0; i < std::size(kCases); ++i) all.push_back({names[i], sceneOf(kCases[i])});

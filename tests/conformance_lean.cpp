@@ -83,13 +83,28 @@ const Removal kRemovals[] = {
      [](Scene& s) {
          forMaterials(s, [](auto& m) {
              m.roughness_texture = m.amount_texture = m.opacity_texture = m.film_texture = crt::kNoTexture;
-             m.tint_texture = crt::kNoTexture;
+             m.tint_texture = m.transmittance_texture = crt::kNoTexture;
              if (m.clearcoat) m.clearcoat->roughness_texture = crt::kNoTexture;
              if (m.clearcoat) m.clearcoat->roughens = false;
              if (m.reflectance_texture == crt::kNoTexture) return;
              m.reflectance_texture = crt::kNoTexture;
              m.reflectance = crt::constantSpectrum(0.5);
          });
+         for (crt::Emission& e : s.emissions) e.texture = crt::kNoTexture;
+     }},
+    {"images that emit",
+     [](Scene& s) {
+         for (auto& e : s.emissions) e.texture = crt::kNoTexture;
+     }},
+    {"factors of images",
+     [](Scene& s) {
+         for (crt::Emission& e : s.emissions) e.texture = crt::kNoTexture;
+         for (crt::Texture& t : s.textures) t.factor.reset();
+     }},
+    {"sheets",
+     [](Scene& s) {
+         forMaterials(s,
+                      [](auto& m) { m.transmittance.reset(), m.transmittance_texture = crt::kNoTexture; });
      }},
     {"tints",
      [](Scene& s) { forMaterials(s, [](auto& m) { m.tint.reset(), m.tint_texture = crt::kNoTexture; }); }},

@@ -1,4 +1,6 @@
 // Scene → blob: the features that a scene needs, and those that are reported as left out.
+//
+// Over 450 lines: one test turns on every feature by itself.
 #include "compiled_scenes.h"
 
 #include "base/error.h"
@@ -205,6 +207,44 @@ TEST_CASE("every feature bit is set by some scene, and by nothing else", "[compi
         other(crt::MaterialType::Dielectric)(s);
         coated(0, 1.5)(s);
         s.materials[1].clearcoat = std::exchange(s.materials[0].clearcoat, std::nullopt);
+    });
+    const auto sheet = [&](crt::MaterialType type) {
+        return [=](Scene& s) {
+            other(type)(s);
+            s.materials[1].transmittance = crt::constantSpectrum(0.5);
+        };
+    };
+    seen |= differs(CRT_FEATURE_PLASTIC | CRT_FEATURE_TRANSLUCENT, 0, sheet(crt::MaterialType::Plastic));
+    differs(CRT_FEATURE_MIRROR, 0, sheet(crt::MaterialType::Mirror));  // which lets nothing through
+    // Its mapped normals are as interpolated ones.
+    differs(CRT_FEATURE_PLASTIC | CRT_FEATURE_TRANSLUCENT | CRT_FEATURE_NORMAL_MAP | CRT_FEATURE_TEXTURE |
+                CRT_FEATURE_SMOOTH_NORMALS,
+            0, [&](Scene& s) {
+                sheet(crt::MaterialType::Plastic)(s);
+                s.textures.emplace_back().kind = crt::Texture::Kind::Checker;
+                s.materials[1].normal_texture = 0;
+            });
+    const auto even = [] {
+        crt::Texture texture;
+        auto image = std::make_shared<crt::TextureImage>();
+        image->width = image->height = 2;
+        image->decode = [](std::span<std::uint16_t> words) { std::fill(words.begin(), words.end(), 32768); };
+        texture.image = std::move(image);
+        return texture;
+    };
+    differs(CRT_FEATURE_TEXTURE, 0, [&](Scene& s) {
+        s.textures = {even()};
+        s.materials[0].reflectance_texture = 0;
+    });
+    seen |= differs(CRT_FEATURE_TEXTURE | CRT_FEATURE_FACTOR, 0, [&](Scene& s) {
+        s.textures = {even()};
+        s.textures[0].factor = crt::TextureValue{crt::constantSpectrum(0.5), crt::kNoTexture};
+        s.materials[0].reflectance_texture = 0;
+    });
+    seen |= differs(CRT_FEATURE_TEXTURE | CRT_FEATURE_FACTOR | CRT_FEATURE_EMISSION_IMAGE, 0, [&](Scene& s) {
+        s.textures = {even()};
+        s.textures[0].factor = crt::TextureValue{s.emissions[0].radiance, crt::kNoTexture};
+        s.emissions[0].texture = 0;
     });
     const auto rough_base = [&](double roughness) {
         return [=](Scene& s) {

@@ -174,6 +174,45 @@ TEST_CASE("Colours of vertices are the base colour, times its factor", "[gltf][i
     CHECK(result.scene.meshes[0].colors[3] == std::array<float, 3>{0.125f, 0.25f, 0.25f});
 }
 
+// Fails when one of the two is left out, or the file's factor counts twice.
+TEST_CASE("Colours of vertices multiply a texture of the base colour", "[gltf][import]") {
+    const Imported result =
+        importOf({{"pbrMetallicRoughness",
+                   {{"baseColorFactor", {0.5, 1, 1, 1}}, {"baseColorTexture", {{"index", 0}}}}}},
+                 [](GltfMaker& m) {
+                     m.texture(rgba(2, 2, kFourTexels));
+                     m.root["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] =
+                         m.points({1, 0, 0, 0, 1, 0, 0, 0, 1, 0.25, 0.25, 0.25});
+                 });
+    CHECK_THAT(result.text, Contains("factor: [0.5, 1, 1], vertex_colors: true"));
+    REQUIRE(result.scene.meshes[0].colors.size() == 4);
+    CHECK(result.scene.meshes[0].colors[3] == std::array<float, 3>{0.25f, 0.25f, 0.25f});
+    const auto& texture =
+        result.scene.textures[static_cast<std::size_t>(result.scene.materials[0].reflectance_texture)];
+    REQUIRE(texture.factor);
+    CHECK(result.scene.textures[static_cast<std::size_t>(texture.factor->texture)].kind ==
+          Texture::Kind::VertexColors);
+}
+
+// Fails when the image is left out, or what it is multiplied with.
+TEST_CASE("An image that emits stays one", "[gltf][import]") {
+    const auto texture = [](GltfMaker& m) { m.texture(rgba(2, 2, kFourTexels)); };
+    const Imported lamp =
+        importOf({{"emissiveFactor", {1, 0.5, 0}}, {"emissiveTexture", {{"index", 0}}}}, texture);
+    CHECK_THAT(lamp.text,
+               Contains("emission: {radiance: {rgb: [1, 0.5, 0], space: linear, scale: 1}, color: "
+                        "{texture: a.glb, image: 0"));
+    REQUIRE(lamp.scene.emissions.size() == 1);
+    CHECK(lamp.scene.emissions[0].texture != kNoTexture);
+    const Imported unlit =
+        importOf({{"extensions", {{"KHR_materials_unlit", Json::object()}}},
+                  {"pbrMetallicRoughness",
+                   {{"baseColorFactor", {0.5, 1, 1, 1}}, {"baseColorTexture", {{"index", 0}}}}}},
+                 texture);
+    CHECK_THAT(unlit.text, Contains("color: {texture: a.glb, image: 0, factor: [0.5, 1, 1]") &&
+                               Contains("two_sided: true}") && Contains("reflectance: 0\n"));
+}
+
 // Fails when an extension is read by another name, or becomes another key.
 TEST_CASE("Extensions of materials become keys of OpenPBR", "[gltf][import]") {
     const auto textOf = [](const char* extension, const Json& value, Json material = Json::object()) {
@@ -201,6 +240,11 @@ TEST_CASE("Extensions of materials become keys of OpenPBR", "[gltf][import]") {
                  "fuzz_roughness: 0.3\n"));
     CHECK_THAT(textOf("KHR_materials_transmission", {{"transmissionFactor", 0.5}}),
                Contains("type: thin_dielectric") && Contains("amount: 0.5") && !Contains("tint:"));
+    CHECK_THAT(
+        textOf("KHR_materials_diffuse_transmission",
+               {{"diffuseTransmissionFactor", 0.5}, {"diffuseTransmissionColorFactor", {1, 0.5, 0.25}}}),
+        Contains("geometry_thin_walled: true\n    subsurface_weight: 0.5\n    subsurface_color: {rgb: "
+                 "[1, 0.5, 0.25], space: linear}\n    subsurface_scatter_anisotropy: 1\n"));
     const Json body{
         {"KHR_materials_volume",
          {{"thicknessFactor", 2}, {"attenuationDistance", 0.5}, {"attenuationColor", {1, 0.5, 0.25}}}}};
@@ -332,7 +376,7 @@ TEST_CASE("What is not in the scene as in the file is told once, and written int
           "[gltf][import]") {
     const Imported result = importOf({{"occlusionTexture", {{"index", 0}}},
                                       {"emissiveFactor", {1, 1, 1}},
-                                      {"emissiveTexture", {{"index", 0}}},
+                                      {"emissiveTexture", {{"index", 0}, {"texCoord", 2}}},
                                       {"normalTexture", {{"index", 0}, {"texCoord", 1}}}},
                                      [](GltfMaker& m) {
                                          m.texture(rgba(2, 2, kFourTexels));
@@ -344,7 +388,7 @@ TEST_CASE("What is not in the scene as in the file is told once, and written int
                                          m.add("skins", {{"joints", {0}}});
                                          m.root["nodes"][0]["skin"] = 0;
                                      });
-    for (const char* what : {"ambient occlusion", "emissive texture", "a mesh has no TEXCOORD_1",
+    for (const char* what : {"ambient occlusion", "a mesh has no TEXCOORD_2", "a mesh has no TEXCOORD_1",
                              "points or lines", "the extension 'VENDOR_thing'", "a skin", "animations"}) {
         CHECK_THAT(result.text, Contains(what));
         CHECK_THAT(result.log, Contains(what));

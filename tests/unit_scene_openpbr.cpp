@@ -1,4 +1,5 @@
 // Scene YAML: the materials that openpbr becomes.
+#include "captured_log.h"
 #include "scene_texts.h"
 
 #include "scene/light_units.h"
@@ -95,6 +96,73 @@ TEST_CASE("openpbr becomes crt's own materials, mixed", "[scene_yaml]") {
     CHECK(film[0].film_thickness_nm == 0);
     CHECK(film[1].film_thickness_nm == 250);
     CHECK(film[1].film_index == constantSpectrum(1.6));
+}
+
+// Fails when the shares of the two sides are exchanged, or a texture is on the wrong side.
+TEST_CASE("openpbr's thin walls are sheets and panes", "[scene_yaml]") {
+    const auto materials = [](const std::string& keys) {
+        return parse("materials: {m: {type: openpbr, geometry_thin_walled: true, " + keys + "}}\n")
+            .materials;
+    };
+    const Material leaf = materials(
+        "subsurface_weight: 1, subsurface_color: 0.8, "
+        "subsurface_scatter_anisotropy: 0.5")[0];
+    CHECK(leaf.type == MaterialType::Plastic);
+    CHECK(leaf.by_color);
+    CHECK(leaf.eta[0] == Approx(1.5));
+    CHECK(leaf.reflectance[0] == Approx(0.2));
+    CHECK((*leaf.transmittance)[0] == Approx(0.6));
+    CHECK_FALSE(materials("subsurface_weight: 1, subsurface_scatter_anisotropy: -1")[0].isTranslucent());
+    const std::vector<Material> half = materials("subsurface_weight: 0.5, base_color: 0.3");
+    REQUIRE(half.size() == 3);
+    CHECK(half[0].reflectance == constantSpectrum(0.3));
+    CHECK_FALSE(half[0].isTranslucent());
+    CHECK(half[1].isTranslucent());
+    const std::vector<Material> pictured = materials(
+        "subsurface_weight: 1, subsurface_color: {checker: [0.2, 0.4]}, subsurface_scatter_anisotropy: 0.5");
+    REQUIRE(pictured.size() == 3);
+    CHECK(pictured[2].amount == 0.75);
+    CHECK(pictured[0].reflectance_texture == 0);
+    CHECK_FALSE(pictured[0].isTranslucent());
+    CHECK(pictured[1].transmittance_texture == 0);
+    CHECK(pictured[1].reflectance == constantSpectrum(0));
+    const Material pane = materials(
+        "transmission_weight: 1, specular_roughness: 0, transmission_color: 0.5, "
+        "thin_film_weight: 1, thin_film_thickness: 0.3")[0];
+    CHECK(pane.type == MaterialType::ThinDielectric);
+    CHECK(*pane.tint == constantSpectrum(0.5));
+    CHECK_FALSE(pane.absorption);
+    CHECK(pane.film_thickness_nm == Approx(300));
+}
+
+// Fails when a sheet may make light, or a colour that is nearly one is refused.
+TEST_CASE("a sheet sends on at most what it receives", "[scene_yaml]") {
+    const auto sheet = [](const std::string& type, const std::string& keys) {
+        return parse("materials: {m: {type: " + type + ", " + keys + "}}\n").materials[0];
+    };
+    const Material paper = sheet("translucent", "reflectance: 0.4, transmittance: 0.6");
+    CHECK(paper.type == MaterialType::Plastic);
+    CHECK(paper.eta == constantSpectrum(1));
+    CHECK(*paper.transmittance == constantSpectrum(0.6));
+    CHECK(paper.transmits());
+    CHECK_FALSE(paper.isClear());
+    CHECK(sheet("plastic", "reflectance: 0.4, transmittance: 0.6").eta == constantSpectrum(1.5));
+    CHECK_FALSE(sheet("plastic", "reflectance: 0.4, transmittance: 0").isTranslucent());
+    const auto refusedSheet = [](const std::string& keys) {
+        return refused("materials: {m: {type: translucent, " + keys + "}}\n");
+    };
+    CHECK_THAT(refusedSheet("reflectance: 0.7, transmittance: 0.5"),
+               Contains("scene.yaml:2:") && Contains("together 1.2 or more") && Contains("at most 1"));
+    CHECK_THAT(refusedSheet("reflectance: 0.7"), Contains("'transmittance' is missing"));
+    const CapturedLog log;
+    (void)parseScene(
+        "crt: 1\nmaterials: {m: {type: translucent, reflectance: {rgb: [0.9, 0.2, 0.2]}, "
+        "transmittance: {rgb: [0.8, 0.2, 0.2]}}}\n",
+        "scene.yaml", ".", {});
+    CHECK_THAT(log.text(), Contains("lets less light through there"));
+    CHECK_THAT(refused("materials:\n  a: {type: translucent, reflectance: 0.1, transmittance: 0.1}\n  b: "
+                       "{type: two_sided, front: a, back: a}\n"),
+               Contains("lets light through"));
 }
 
 TEST_CASE("openpbr's coat lies on each of its parts, which are others below it", "[scene_yaml]") {

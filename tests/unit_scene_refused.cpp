@@ -86,7 +86,7 @@ TEST_CASE("unknown, misspelt and duplicate keys", "[scene_yaml][refused]") {
     CHECK_THAT(refused("title: a\ntitle: b\n"),
                Contains("scene.yaml:3:1: error: duplicate key 'title', already given in line 2"));
     CHECK_THAT(refused("materials: {a: {type: difuse}}\n"),
-               Contains("scene.yaml:2:23: error: expected one of diffuse, mirror, conductor, "
+               Contains("scene.yaml:2:23: error: expected one of diffuse, translucent, mirror, conductor, "
                         "rough_conductor, dielectric, rough_dielectric, thin_dielectric, plastic, "
                         "openpbr, mix, two_sided for 'type'") &&
                    Contains("did you mean 'diffuse'?"));
@@ -107,7 +107,7 @@ TEST_CASE("unknown, misspelt and duplicate keys", "[scene_yaml][refused]") {
 TEST_CASE("columns count characters, not bytes", "[scene_yaml][refused]") {
     const Error e = refusal("crt: 1\nmaterials: {grün: {refl: 1}}\n");
     CHECK_THAT(e.what(), Contains("scene.yaml:2:19: error: 'type' is missing in material 'grün': one of "
-                                  "diffuse, mirror, conductor, rough_conductor, dielectric, "
+                                  "diffuse, translucent, mirror, conductor, rough_conductor, dielectric, "
                                   "rough_dielectric, thin_dielectric, plastic, openpbr, mix, two_sided\n"
                                   "    2 | materials: {grün: {refl: 1}}\n"
                                   "      |                   ^"));
@@ -293,6 +293,9 @@ TEST_CASE("spectra that cannot be", "[scene_yaml][refused]") {
     };
     for (const auto& [keys, why, instead] :
          {std::tuple{"subsurface_weight: 1", "subsurface scattering", "remove 'subsurface_weight'"},
+          std::tuple{"subsurface_weight: 1, geometry_thin_walled: true, coat_weight: 1",
+                     "a coat on what lets light through", "leave 'coat_weight'"},
+          std::tuple{"transmission_weight: 1, geometry_thin_walled: true", "must be smooth", "ness' 0"},
           std::tuple{"coat_weight: 0.5, transmission_weight: 0.5", "coats lie on what is opaque",
                      "leave 'coat_weight'"},
           std::tuple{"coat_weight: {checker: [0, 1]}, coat_ior: 0.9", "an index of 1 to 10", "from 1 to 10"},
@@ -303,7 +306,6 @@ TEST_CASE("spectra that cannot be", "[scene_yaml][refused]") {
           std::tuple{"coat_weight: 1, specular_ior: 17", "must be 1 to 10", "of at least 1"},
           std::tuple{"fuzz_weight: 1, emission_luminance: 1", "take some of the emitted light",
                      "leave 'fuzz_weight'"},
-          std::tuple{"geometry_thin_walled: true", "does not support thin-walled", "use a thin_dielectric"},
           std::tuple{"base_metalness: 1, specular_weight: 2", "more light than it receives", "1 or less"},
           std::tuple{"specular_color: 0.5, transmission_weight: 0.5", "for what is opaque only",
                      "leave 'specular_color'"},

@@ -1,4 +1,6 @@
 // Scene YAML: surfaces that emit by luminance, luminous flux or watts.
+#include "base/temporary_folder.h"
+#include "image/image_io.h"
 #include "scene_texts.h"
 
 #include "scene/light_units.h"
@@ -74,6 +76,45 @@ TEST_CASE("flux of spheres, disks and cylinders", "[scene_yaml][lights]") {
         CHECK(luminanceOf(shiningScene(std::string(shape) + ", transform: [{scale: -3}]",
                                        "luminous_flux_lm: 10")) == Approx(10 / (kPiHere * 9 * area)));
     }
+}
+
+// Fails when the colour is left out, or the radiance is no factor of the image.
+TEST_CASE("a surface may shine in a colour by place", "[scene_yaml][lights]") {
+    const Spectrum radiance =
+        lampOf(shiningScene(kLampQuad, "radiance: 4, color: {table: {nm: [360, 830], value: [0, 1]}}"))
+            .radiance;
+    CHECK(radiance[0] == 0);
+    CHECK(radiance[470] == Approx(4));
+    CHECK(radiance[235] == Approx(2));
+    const TemporaryFolder folder;
+    Image image;
+    image.width = image.height = 2;
+    image.channels = {"R", "G", "B"};
+    image.pixels = {0, 0, 0, 1, 1, 1, 0.5, 0.5, 0.5, 0, 0, 1};
+    const std::string path = folder.path() + "/a.pfm";
+    writeImage(path, OutputFormat::Pfm, image);
+    const std::string with_uvs =
+        "mesh: {positions: [[0,0,0],[2,0,0],[2,3,0],[0,3,0]], uvs: "
+        "[[0,0],[1,0],[1,1],[0,1]], faces: [[0,1,2,3]]}";
+    const std::string color = "color: {texture: " + path + "}";
+    const Scene scene = parse(shiningScene(with_uvs, "luminance_cd_m2: 100, " + color));
+    const Emission& lamp = scene.emissions[0];
+    REQUIRE(lamp.texture != kNoTexture);
+    const Texture& texture = scene.textures[static_cast<std::size_t>(lamp.texture)];
+    REQUIRE(texture.factor);
+    CHECK(texture.factor->spectrum == lamp.radiance);
+    CHECK(photometric(lamp.radiance) == Approx(100));
+    CHECK_THAT(refused(shiningScene(kLampQuad, "radiance: 1, " + color)),
+               Contains("no texture coordinates") && Contains("give the mesh 'uvs'"));
+    CHECK_THAT(refused(shiningScene("sphere: {radius: 1}", "radiance: 1, " + color)),
+               Contains("only a mesh can emit an image"));
+    CHECK_THAT(refused(shiningScene(with_uvs, "luminous_flux_lm: 1, " + color)),
+               Contains("the flux of a surface with 'color' is not known"));
+    CHECK_THAT(refused(shiningScene(with_uvs, "radiance: 1, color: {checker: [0, 1]}")),
+               Contains("what emits is an image"));
+    CHECK_THAT(
+        refused(shiningScene(with_uvs, "radiance: 1, color: {texture: " + path + ", vertex_colors: true}")),
+        Contains("without 'vertex_colors'"));
 }
 
 TEST_CASE("brightness of surfaces that cannot be is refused", "[scene_yaml][lights]") {

@@ -80,7 +80,7 @@ const std::vector<Case>& registry() {
               bodyCases,       shadingNormalCases, quadricCases,      instanceCases,      shapeLightCases,
               colourCases,     textureCases,       accumulationCases, splatCases,         cameraCases,
               firstHitCases,   imageCases,         backendCases,      exactRelationCases, mutantCases,
-              contactCases,    roughByPlaceCases,  tintCases})
+              contactCases,    roughByPlaceCases,  tintCases,         sheetCases,         screenCases})
             for (Case& c : group()) all.push_back(std::move(c));
         std::sort(all.begin(), all.end(), [](const Case& a, const Case& b) { return a.id < b.id; });
         return all;

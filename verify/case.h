@@ -110,6 +110,8 @@ std::vector<Case> anisotropyCases();     ///< G, brushed surfaces
 std::vector<Case> openPbrCases();        ///< G, openpbr
 std::vector<Case> openPbrCoatCases();    ///< G, coats
 std::vector<Case> tintCases();           ///< G, colours of mirrors, gloss and panes
+std::vector<Case> sheetCases();          ///< G, thin sheets that light passes diffusely
+std::vector<Case> screenCases();         ///< G, emission that is an image
 std::vector<Case> roughByPlaceCases();   ///< G, gloss and coats whose roughness depends on the place
 std::vector<Case> instanceCases();       ///< D, meshes that are stored once and placed many times
 std::vector<Case> quadricCases();        ///< D and G, spheres, disks and cylinders

@@ -121,6 +121,35 @@ std::vector<Variant> variants(int resolution) {
             if (!material.transmits())
                 material.clearcoat = Clearcoat{.ior = 1.5, .roughness = 0.3, .depth = constantSpectrum(0.2)};
     });
+    add("thin sheets", [](Scene& s) {
+        for (Material& material : s.materials)
+            if (material.type == MaterialType::Diffuse) {
+                material.type = MaterialType::Plastic;
+                material.eta = constantSpectrum(1.4);
+                material.roughness = 0.3;
+                material.transmittance = constantSpectrum(0.4);
+            }
+    });
+    add("lamps that show an image", [](Scene& s) {
+        auto image = std::make_shared<TextureImage>();
+        image->file = "picture";
+        image->width = image->height = 5;
+        image->decode = [](std::span<std::uint16_t> words) {
+            for (std::size_t i = 0; i < words.size(); ++i)
+                words[i] = static_cast<std::uint16_t>(32768 + 256 * (i * 7 % 11));
+        };
+        Texture picture;
+        picture.image = std::move(image);
+        for (Emission& emission : s.emissions) {
+            picture.factor = TextureValue{emission.radiance, kNoTexture};
+            emission.texture = static_cast<TextureIndex>(s.textures.size());
+            s.textures.push_back(picture);
+        }
+        for (Mesh& mesh : s.meshes) {
+            for (const Vec3d& p : mesh.positions) mesh.uvs.push_back({p[0] + 0.5 * p[1], p[2] - 0.5 * p[1]});
+            mesh.uv_index = mesh.triangles;
+        }
+    });
     add("gloss and coats of varying roughness, tints", [](Scene& s) {
         Texture checker;
         checker.kind = Texture::Kind::Checker;

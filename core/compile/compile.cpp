@@ -141,7 +141,7 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
         header.environment_image = appendEnvironmentImage(blob, *scene.environment, *around);
     }
     LightPart lights =
-        compileLights(scene, flat, emitting, accelerator, spectra, around ? &*around : nullptr);
+        compileLights(scene, flat, emitting, accelerator, spectra, around ? &*around : nullptr, textures);
     appendForms(scene, flat, blob, lights.point_lights);
     header.lights = appendLights(lights, blob);
     header.tree_lights = lights.tree_lights;
@@ -206,7 +206,7 @@ CompiledScene compileParts(const Scene& scene, std::uint32_t aovs, const Compile
                        [](const FlatShape& shape) { return shape.record; });
     });
 
-    header.features = featuresOf(scene, header, materials, texture_part);
+    header.features = featuresOf(scene, header, materials, texture_part, lights.features);
     warnOfUnseenLights(scene, header);
     decodeTextures(texture_part, blob);  // into the blob, which does not move any more
 

@@ -2,6 +2,7 @@
 
 #include "base/vec3d.h"
 #include "compile/distributions.h"
+#include "compile/emission_image.h"
 #include "compile/geometry.h"
 #include "compile/light_tree.h"
 #include "compile/point_lights.h"
@@ -9,6 +10,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <map>
 #include <numbers>
 #include <numeric>
 #include <optional>
@@ -74,21 +76,17 @@ double areaAround(const FlatScene& flat) {
     return std::max(std::numbers::pi * dot(diagonal, diagonal), 1e-12);
 }
 
-/// Of a triangle, or of two that make a parallelogram.
-LightBounds boundsOfEmitter(const FlatScene& flat, std::size_t triangle, std::size_t triangles,
-                            bool two_sided, double power) {
+/// Of a triangle, of two that make a parallelogram, or of a part of one. `corners`: the first three are
+/// those of a triangle, by which way it faces.
+LightBounds boundsOfEmitter(const std::vector<Vec3d>& corners, bool two_sided, double power) {
     LightBounds bounds;
-    bounds.lower = bounds.upper = vertexOf(flat, triangle, 0);
-    for (std::size_t i = triangle; i < triangle + triangles; ++i)
-        for (std::size_t corner = 0; corner < 3; ++corner) {
-            const Vec3d v = vertexOf(flat, i, corner);
-            for (std::size_t k = 0; k < 3; ++k) {
-                bounds.lower[k] = std::min(bounds.lower[k], v[k]);
-                bounds.upper[k] = std::max(bounds.upper[k], v[k]);
-            }
+    bounds.lower = bounds.upper = corners[0];
+    for (const Vec3d& v : corners)
+        for (std::size_t k = 0; k < 3; ++k) {
+            bounds.lower[k] = std::min(bounds.lower[k], v[k]);
+            bounds.upper[k] = std::max(bounds.upper[k], v[k]);
         }
-    const Vec3d o = vertexOf(flat, triangle, 0);
-    const Vec3d normal = cross(vertexOf(flat, triangle, 1) - o, vertexOf(flat, triangle, 2) - o);
+    const Vec3d normal = cross(corners[1] - corners[0], corners[2] - corners[0]);
     const double length2 = dot(normal, normal);
     // A sliver's normal is rounding: it may shine anywhere.
     if (length2 > 0)
@@ -100,6 +98,57 @@ LightBounds boundsOfEmitter(const FlatScene& flat, std::size_t triangle, std::si
     bounds.power = power;
     return bounds;
 }
+
+std::vector<Vec3d> cornersOfTriangles(const FlatScene& flat, std::size_t triangle, std::size_t triangles) {
+    std::vector<Vec3d> corners;
+    for (std::size_t i = triangle; i < triangle + triangles; ++i)
+        for (std::size_t corner = 0; corner < 3; ++corner) corners.push_back(vertexOf(flat, i, corner));
+    return corners;
+}
+
+/// The tiles of what emits by images: how many, and how bright.
+class Tiles {
+public:
+    Tiles(const Scene& scene, const FlatScene& flat, const std::vector<std::uint32_t>& emitting)
+        : scene_(scene), flat_(flat) {
+        double wanted = 0;
+        for (const std::uint32_t i : emitting)
+            if (const Emission& emission = emissionOf(scene, flat.triangles[i]);
+                emission.texture != kNoTexture) {
+                images_.try_emplace(emission.texture,
+                                    scene.textures[static_cast<std::size_t>(emission.texture)]);
+                wanted += texelsUnder(i);
+            }
+        share_ = std::min(1.0, kMostTiles / std::max(wanted, 1.0));
+    }
+
+    /// One for each texel under the triangle, or fewer where there are many.
+    std::uint32_t rowsOf(std::uint32_t triangle) const {
+        const double rows = std::sqrt(texelsUnder(triangle) * share_);
+        return static_cast<std::uint32_t>(std::clamp<double>(rows, 1, CRT_TILE_ROWS_MAX));
+    }
+    /// Of 1 where all texels are white; nowhere 0, and nowhere far less than in the image as a whole.
+    double brightnessOf(std::uint32_t triangle, const TileCorners& tile) const {
+        constexpr TileCorners kWhole{{{0, 0}, {1, 0}, {0, 1}}};
+        constexpr double kLeast = 1e-6, kEven = 0.01;
+        const EmissionImage& image = imageOf(triangle);
+        const kernel::CrtUvs& uvs = flat_.uvs[triangle];
+        return std::max(image.mean(uvs, tile), kEven * image.mean(uvs, kWhole)) + kLeast;
+    }
+
+private:
+    const EmissionImage& imageOf(std::uint32_t triangle) const {
+        return images_.at(emissionOf(scene_, flat_.triangles[triangle]).texture);
+    }
+    double texelsUnder(std::uint32_t triangle) const {
+        return std::min<double>(imageOf(triangle).texelsUnder(flat_.uvs[triangle]), kMostTiles);
+    }
+
+    const Scene& scene_;
+    const FlatScene& flat_;
+    std::map<TextureIndex, EmissionImage> images_;
+    double share_ = 1;
+};
 
 /// Of a shape: a disk has one normal, all others have normals all round.
 LightBounds boundsOfShape(const FlatScene& flat, std::size_t id, bool two_sided, double power) {
@@ -113,6 +162,32 @@ LightBounds boundsOfShape(const FlatScene& flat, std::size_t id, bool two_sided,
     bounds.two_sided = two_sided;
     bounds.power = power;
     return bounds;
+}
+
+/// Of an emitter that light sampling leaves to scattered rays.
+constexpr double kHardlyEver = 1e-6;
+
+/// Adds the tiles of a triangle, each a light like `light`.
+void addTiles(const FlatScene& flat, const Tiles& tiles, std::uint32_t triangle, kernel::CrtLight light,
+              double brightness, LightPart& part, std::vector<double>& power,
+              std::vector<std::optional<LightBounds>>& bounds) {
+    part.light_of[triangle] = static_cast<std::uint32_t>(part.lights.size());
+    const std::uint32_t rows = tiles.rowsOf(triangle);
+    const double area = areaOf(flat, triangle) / (static_cast<double>(rows) * rows);
+    const bool two_sided = (light.flags & CRT_LIGHT_TWO_SIDED) != 0;
+    const double scale = area * brightness * (two_sided ? 2 : 1) *
+                         ((light.flags & CRT_LIGHT_UNSAMPLED) != 0 ? kHardlyEver : 1);
+    const Vec3d o = vertexOf(flat, triangle, 0), a = vertexOf(flat, triangle, 1) - o,
+                b = vertexOf(flat, triangle, 2) - o;
+    light.area = static_cast<float>(area);
+    for (const Tile& tile : tilesOf(rows)) {
+        light.corner = tile.corner;
+        part.lights.push_back(light);
+        power.push_back(scale * tiles.brightnessOf(triangle, tile.at));
+        std::vector<Vec3d> corners;
+        for (const auto& [b1, b2] : tile.at) corners.push_back(o + a * b1 + b * b2);
+        bounds.push_back(boundsOfEmitter(corners, two_sided, power.back()));
+    }
 }
 
 /// Nothing for lights that lie nowhere, and beams, which light what is in them alone.
@@ -183,7 +258,8 @@ std::vector<std::uint32_t> emittingTriangles(const Scene& scene, const FlatScene
 
 LightPart compileLights(const Scene& scene, const FlatScene& flat,
                         const std::vector<std::uint32_t>& emitting, const AcceleratorPart& accelerator,
-                        SpectrumTable& spectra, const EnvironmentTexels* around) {
+                        SpectrumTable& spectra, const EnvironmentTexels* around,
+                        const std::vector<TextureIndex>& textures) {
     LightPart part;
     part.light_of.assign(flat.triangles.size(), CRT_NONE);
     struct Shared {
@@ -193,11 +269,24 @@ LightPart compileLights(const Scene& scene, const FlatScene& flat,
     std::vector<std::optional<Shared>> shared(scene.emissions.size());  // made once an emission
     std::vector<double> power;
     std::vector<std::optional<LightBounds>> bounds;
+    const Tiles tiles(scene, flat, emitting);
     for (const std::uint32_t i : emitting) {
         if (part.light_of[i] != CRT_NONE) continue;  // the other half of a parallelogram
         const Emission& emission = emissionOf(scene, flat.triangles[i]);
         std::optional<Shared>& own = shared[static_cast<std::size_t>(flat.triangles[i].emission)];
         if (!own) own = {spectra.valueOf(emission.radiance), brightness(emission.radiance)};
+        if (emission.texture != kNoTexture) {
+            part.features |= CRT_FEATURE_EMISSION_IMAGE;
+            const auto record = std::find(textures.begin(), textures.end(), emission.texture);
+            kernel::CrtLight light{};
+            light.kind = CRT_LIGHT_TILE;
+            light.slot = accelerator.slot_of_id[i];
+            light.radiance = CRT_VALUE_TEXTURE | static_cast<std::uint32_t>(record - textures.begin());
+            light.flags = emission.two_sided ? CRT_LIGHT_TWO_SIDED : 0;
+            if (isPassable(scene, flat.triangles[i])) light.flags |= CRT_LIGHT_UNSAMPLED;
+            addTiles(flat, tiles, i, light, own->brightness, part, power, bounds);
+            continue;
+        }
         const bool shape = i >= flat.firstShape();
         double area = shape ? areaOf(flat.shapes[i - flat.firstShape()]) : areaOf(flat, i);
         kernel::CrtLight light{};
@@ -216,11 +305,11 @@ LightPart compileLights(const Scene& scene, const FlatScene& flat,
         const bool passable = isPassable(scene, flat.triangles[i]);
         if (passable) light.flags |= CRT_LIGHT_UNSAMPLED;
         part.lights.push_back(light);
-        constexpr double kHardlyEver = 1e-6;
         if (passable) area *= kHardlyEver;
         power.push_back(area * own->brightness * (emission.two_sided ? 2 : 1));
         bounds.push_back(shape ? boundsOfShape(flat, i, emission.two_sided, power.back())
-                               : boundsOfEmitter(flat, i, light.kind == CRT_LIGHT_PARALLELOGRAM ? 2 : 1,
+                               : boundsOfEmitter(cornersOfTriangles(
+                                                     flat, i, light.kind == CRT_LIGHT_PARALLELOGRAM ? 2 : 1),
                                                  emission.two_sided, power.back()));
     }
     part.emitters = static_cast<std::uint32_t>(part.lights.size());

@@ -26,14 +26,16 @@ struct LightPart {
     std::vector<kernel::CrtLightNode> tree;  ///< Of the first `tree_lights` lights; empty: there is none.
     std::uint32_t tree_lights = 0;
     std::vector<kernel::CrtPointLight> point_lights;
-    std::uint32_t emitters = 0;           ///< Lights that are triangles or parallelograms: the first ones.
+    std::uint32_t emitters = 0;  ///< Lights with a surface: the first ones.
+    std::uint64_t features = 0;  ///< That kernels need for emission that is an image.
     double power = 0;  ///< Of all lights, in the units that they are chosen by.
 };
 /// `around`: the texels of an environment that has them, or null. The light of the environment has no
-/// radiance yet: its spectrum comes last in the table.
+/// radiance yet: its spectrum comes last in the table. `textures`: those that have a record.
 LightPart compileLights(const Scene& scene, const FlatScene& flat,
                         const std::vector<std::uint32_t>& emitting, const AcceleratorPart& accelerator,
-                        SpectrumTable& spectra, const EnvironmentTexels* around);
+                        SpectrumTable& spectra, const EnvironmentTexels* around,
+                        const std::vector<TextureIndex>& textures);
 
 /// The lights, and behind them the tree.
 kernel::CrtSpan appendLights(const LightPart& part, BlobWriter& blob);

@@ -65,7 +65,8 @@ kernel::CrtMaterial recordOf(const Material& material, const MaterialTables& tab
     };
     kernel::CrtMaterial record{};
     record.type = static_cast<std::uint32_t>(material.type);
-    if (material.transmits()) record.flags = CRT_MATERIAL_TRANSMITS;
+    if (material.isClear()) record.flags = CRT_MATERIAL_TRANSMITS;
+    if (material.isTranslucent()) record.flags |= CRT_MATERIAL_TRANSLUCENT;
     if (hasClearcoat(material) && material.clearcoat->roughens) record.flags |= CRT_MATERIAL_UNDER_COAT;
     if (material.isTinted()) record.flags |= CRT_MATERIAL_TINTED;
     const auto losses = tables.compensations.table_of.find(&material);
@@ -154,6 +155,10 @@ kernel::CrtLayers layersOf(const Material& material, const MaterialTables& table
     if (material.isTinted())
         record.tint = material.tint_texture != kNoTexture ? textures.valueOf(material.tint_texture)
                                                           : spectra.valueOf(*material.tint);
+    if (material.isTranslucent())
+        record.transmittance = material.transmittance_texture != kNoTexture
+                                   ? textures.valueOf(material.transmittance_texture)
+                                   : spectra.valueOf(*material.transmittance);
     if (hasRoughBase(material)) {
         const RoughBase& base = tables.rough_bases.at(&material);
         record.base_loss = spectra.valueOf(base.loss);
@@ -266,8 +271,8 @@ MaterialPart compileMaterials(const std::vector<const Material*>& materials, con
         if (!material) continue;
         record = recordOf(*material, tables, spectra, textures);
         layers = layersOf(*material, tables, spectra, textures);
-        has_layers |=
-            hasFuzz(*material) || hasClearcoat(*material) || hasRoughBase(*material) || material->isTinted();
+        has_layers |= hasFuzz(*material) || hasClearcoat(*material) || hasRoughBase(*material) ||
+                      material->isTinted() || material->isTranslucent();
         if (!material->isOpaque()) part.features |= CRT_FEATURE_OPACITY;
         if (material->normal_texture != kNoTexture) part.features |= CRT_FEATURE_NORMAL_MAP;
         if (material->isComposed()) {
@@ -281,6 +286,10 @@ MaterialPart compileMaterials(const std::vector<const Material*>& materials, con
         if (hasFuzz(*material)) part.features |= CRT_FEATURE_FUZZ;
         if (hasClearcoat(*material)) part.features |= CRT_FEATURE_CLEARCOAT;
         if (material->isTinted()) part.features |= CRT_FEATURE_TINT;
+        // Its mapped normals are as interpolated ones.
+        if (material->isTranslucent())
+            part.features |= CRT_FEATURE_TRANSLUCENT |
+                             (material->normal_texture != kNoTexture ? CRT_FEATURE_SMOOTH_NORMALS : 0);
         if (hasVaryingCoat(*material)) part.features |= CRT_FEATURE_COAT_TEXTURE;
         if (hasRoughBase(*material)) part.features |= CRT_FEATURE_ROUGH_BASE;
     }

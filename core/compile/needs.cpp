@@ -27,8 +27,8 @@ bool scatters(const Scene& scene) { return isOfLight(scene) && scene.integrator.
 }  // namespace
 
 std::uint64_t featuresOf(const Scene& scene, const kernel::CrtScene& header, const MaterialPart& materials,
-                         const TexturePart& textures) {
-    std::uint64_t f = textures.features;
+                         const TexturePart& textures, std::uint64_t of_lights) {
+    std::uint64_t f = textures.features | of_lights;
     const auto need = [&](bool condition, std::uint64_t feature) { f |= condition ? feature : 0; };
     need(header.sampler == CRT_SAMPLER_SOBOL, CRT_FEATURE_SOBOL);
     need(header.sampler == CRT_SAMPLER_INDEPENDENT, CRT_FEATURE_INDEPENDENT);
@@ -97,6 +97,8 @@ LeftOut leftOut(const Scene& scene, const kernel::CrtScene& header, std::size_t 
     if (has(CRT_FEATURE_TEXTURE) && !has(CRT_FEATURE_##KERNELS)) left_out(#word, "no texture is one");
     CRT_PATTERN_LIST(CRT_LEFT_OUT_PATTERN)
 #undef CRT_LEFT_OUT_PATTERN
+    if (has(CRT_FEATURE_TEXTURE) && !has(CRT_FEATURE_FACTOR))
+        left_out("factors of images", "no image is multiplied by another value");
     if (!has(CRT_FEATURE_DISPERSION))
         left_out("hero wavelength selection", "no index of refraction depends on wavelength");
     if (!has(CRT_FEATURE_MEDIA)) left_out("absorption", "no body absorbs");
@@ -108,6 +110,8 @@ LeftOut leftOut(const Scene& scene, const kernel::CrtScene& header, std::size_t 
         left_out("gloss of varying roughness",
                  "the roughness of gloss and of coats does not depend on the place");
     if (!has(CRT_FEATURE_TINT)) left_out("tints", "what is mirrored has the colours of Fresnel's equations");
+    if (!has(CRT_FEATURE_TRANSLUCENT))
+        left_out("translucent sheets", "no surface scatters light to its other side");
     if (!has(CRT_FEATURE_CLEARCOAT)) left_out("coats", "no surface has one on top");
     if (!has(CRT_FEATURE_FUZZ)) left_out("fuzz", "no surface has any");
     if (!has(CRT_FEATURE_ROUGH_BASE)) left_out("rough diffuse bases", "all are Lambert's");
@@ -116,6 +120,7 @@ LeftOut leftOut(const Scene& scene, const kernel::CrtScene& header, std::size_t 
     if (!has(CRT_FEATURE_INSTANCES)) left_out("instances", "every triangle is stored where it stands");
     if (!has(CRT_FEATURE_SMOOTH_NORMALS)) left_out("shading normals", "all faces are flat");
     if (!has(CRT_FEATURE_AREA_LIGHT)) left_out("emission from surfaces", "nothing emits");
+    if (!has(CRT_FEATURE_EMISSION_IMAGE)) left_out("emission by place", "no emission is an image");
     if (!has(CRT_FEATURE_NEE))
         left_out("light sampling and shadow rays",
                  !header.nee ? "integrator.nee is false"

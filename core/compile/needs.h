@@ -15,9 +15,9 @@
 
 namespace crt {
 
-/// `header` is complete but for its features.
+/// `header` is complete but for its features. `of_lights`: what the lights need.
 std::uint64_t featuresOf(const Scene& scene, const kernel::CrtScene& header, const MaterialPart& materials,
-                         const TexturePart& textures);
+                         const TexturePart& textures, std::uint64_t of_lights);
 
 /// A feature that is left out, and the reason.
 using LeftOut = std::vector<std::pair<std::string, std::string>>;

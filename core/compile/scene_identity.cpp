@@ -101,7 +101,7 @@ private:
         std::vector<CrtLight> by_id(lights, lights + header_.lights.count);
         for (CrtLight& light : by_id)
             if (light.kind == CRT_LIGHT_TRIANGLE || light.kind == CRT_LIGHT_PARALLELOGRAM ||
-                light.kind == CRT_LIGHT_SHAPE)
+                light.kind == CRT_LIGHT_SHAPE || light.kind == CRT_LIGHT_TILE)
                 light.slot = rows<CrtTriangle>(header_.triangles)[light.slot].id;
         add(by_id.data(), by_id.size());
     }

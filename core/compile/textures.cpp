@@ -9,13 +9,7 @@
 #include <map>
 
 namespace crt {
-namespace {
 
-const Texture& at(const Scene& scene, TextureIndex index) {
-    return scene.textures[static_cast<std::size_t>(index)];
-}
-
-/// (s, t) of the kernel, t down from the upper edge, from (u, v), v up.
 void setTransform(const Texture& texture, kernel::CrtTexture& record) {
     const std::array<double, 6>& m = texture.transform;
     const bool image = texture.kind == Texture::Kind::Image;
@@ -23,6 +17,12 @@ void setTransform(const Texture& texture, kernel::CrtTexture& record) {
         record.from_uv[i] = static_cast<float>(m[i]);
         record.from_uv[3 + i] = static_cast<float>(image ? (i == 2 ? 1 - m[5] : -m[3 + i]) : m[3 + i]);
     }
+}
+
+namespace {
+
+const Texture& at(const Scene& scene, TextureIndex index) {
+    return scene.textures[static_cast<std::size_t>(index)];
 }
 
 /// Does not compile where two kinds have one number.
@@ -57,12 +57,15 @@ std::vector<TextureIndex> usedTextures(const Scene& scene, const std::vector<con
     for (const Material* material : materials)
         if (material)
             for (const TextureIndex index : material->textures()) use(index);
-    // From the last on: a pattern comes after the textures that it uses.
+    if (measuresLight(scene.integrator.type))
+        for (const Emission& emission : scene.emissions) use(emission.texture);
+    // From the last on: a texture comes after those that it uses.
     std::vector<TextureIndex> all;
     for (std::size_t i = used.size(); i-- > 0;) {
         if (!used[i]) continue;
         all.push_back(static_cast<TextureIndex>(i));
         for (const TextureValue& value : scene.textures[i].values) use(value.texture);
+        if (const auto& factor = scene.textures[i].factor) use(factor->texture);
     }
     std::reverse(all.begin(), all.end());
     return all;
@@ -83,6 +86,9 @@ TexturePart compileTextures(const Scene& scene, const std::vector<TextureIndex>&
     TexturePart part;
     part.record_of.resize(scene.textures.size());
     std::map<const TextureImage*, kernel::CrtSpan> span_of;
+    const auto valueOf = [&](const TextureValue& value) {
+        return value.texture != kNoTexture ? part.valueOf(value.texture) : spectra.valueOf(value.spectrum);
+    };
     for (const TextureIndex index : textures) {
         const Texture& texture = at(scene, index);
         kernel::CrtTexture record{};
@@ -102,11 +108,11 @@ TexturePart compileTextures(const Scene& scene, const std::vector<TextureIndex>&
                 part.texel_bytes += image.words() * sizeof(std::uint16_t);
             }
             record.words = known->second;
+            if (texture.factor) {
+                record.first = valueOf(*texture.factor);
+                part.features |= CRT_FEATURE_FACTOR;
+            }
         } else if (texture.kind != Texture::Kind::VertexColors) {
-            const auto valueOf = [&](const TextureValue& value) {
-                return value.texture != kNoTexture ? part.valueOf(value.texture)
-                                                   : spectra.valueOf(value.spectrum);
-            };
             record.first = valueOf(texture.values[0]);
             record.second = valueOf(texture.values[1]);
             record.words = appendNumbers(texture.numbers, blob);

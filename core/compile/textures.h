@@ -12,7 +12,8 @@
 
 namespace crt {
 
-/// The textures of the scene that the materials name, and those of their patterns, in the scene's order.
+/// The textures of the scene that the materials and what emits name, and those of their patterns and
+/// factors, in the scene's order. compileTextures() makes a record of each, in this order.
 std::vector<TextureIndex> usedTextures(const Scene& scene, const std::vector<const Material*>& materials);
 
 /// That their images take in the blob.
@@ -29,6 +30,9 @@ struct TexturePart {
         return CRT_VALUE_TEXTURE | record_of[static_cast<std::size_t>(texture)];
     }
 };
+/// (s, t) of the kernel, t down from the upper edge, from (u, v), v up.
+void setTransform(const Texture& texture, kernel::CrtTexture& record);
+
 /// Puts the numbers of patterns into the blob, and makes room there for the texels, each image once.
 TexturePart compileTextures(const Scene& scene, const std::vector<TextureIndex>& textures,
                             SpectrumTable& spectra, BlobWriter& blob);

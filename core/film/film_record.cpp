@@ -177,7 +177,7 @@ SceneTrait materialsTrait(const Scene& scene) {
 
 /// Of images their names and sizes: their texels are read by compilation alone.
 void addTexture(Digest& digest, const Texture& texture) {
-    const auto& [kind, image, filter, wrap, values, numbers, transform, of_opacity, place] = texture;
+    const auto& [kind, image, filter, wrap, values, numbers, factor, transform, of_opacity, place] = texture;
     digest.add(kind);
     digest.add(filter);
     digest.add(wrap);
@@ -187,6 +187,10 @@ void addTexture(Digest& digest, const Texture& texture) {
     }
     for (const double number : numbers) digest.add(number);
     for (const double number : transform) digest.add(number);
+    if (factor) {
+        digest.add(factor->spectrum);
+        digest.add(factor->texture);
+    }
     if (!image) return;
     if (of_opacity) digest.add(of_opacity);
     digest.add(std::vector<char>(image->file.begin(), image->file.end()));
@@ -205,6 +209,7 @@ SceneTrait lightsTrait(const Scene& scene) {
     for (const Emission& emission : scene.emissions) {
         digest.add(emission.two_sided);
         digest.add(emission.radiance);
+        if (emission.texture != kNoTexture) digest.add(emission.texture);
     }
     if (scene.environment) {
         digest.add(scene.environment->radiance);

@@ -40,7 +40,7 @@ inline constexpr std::pair<MaterialType, const char*> kComposedNames[] = {
 /// Largest depth of nesting of mixes and two-sided materials.
 inline constexpr int kDeepestComposition = 8;
 /// Largest depth of the mixes that an openpbr material becomes.
-inline constexpr int kDeepestOpenPbr = 3;
+inline constexpr int kDeepestOpenPbr = 4;
 
 /// The coat of OpenPBR Surface 1.1 (kernel/materials/clearcoat.h), on what reflects alone.
 struct Clearcoat {
@@ -76,6 +76,10 @@ struct Material {
     /// On what metals and gloss mirror and on what panes let through; nothing: 1. In [0,1].
     std::optional<Spectrum> tint;
     TextureIndex tint_texture = kNoTexture;  ///< In place of the tint.
+    /// Plastic: what the base lets through, a thin sheet, beside its reflectance; nothing: 0. In [0,1]; it
+    /// lets through at most what it does not reflect.
+    std::optional<Spectrum> transmittance;
+    TextureIndex transmittance_texture = kNoTexture;  ///< In place of the transmittance.
     double anisotropy = 0;  ///< Rough kinds. In [0,1]: how much narrower GGX is across the tangent.
     double anisotropy_rotation_deg = 0;  ///< From the coordinates' tangent, counter-clockwise seen from
                                          ///< the outside.
@@ -110,11 +114,20 @@ struct Material {
         return roughness_texture != kNoTexture || (clearcoat && clearcoat->roughens);
     }
     /// The textures that it names itself; kNoTexture among them.
-    std::array<TextureIndex, 8> textures() const {
-        return {reflectance_texture, roughness_texture,
-                tint_texture,        film_texture,
-                opacity_texture,     amount_texture,
-                normal_texture,      clearcoat ? clearcoat->roughness_texture : kNoTexture};
+    std::array<TextureIndex, 9> textures() const {
+        return {reflectance_texture,
+                transmittance_texture,
+                roughness_texture,
+                tint_texture,
+                film_texture,
+                opacity_texture,
+                amount_texture,
+                normal_texture,
+                clearcoat ? clearcoat->roughness_texture : kNoTexture};
+    }
+    /// True if it is a thin sheet that scatters light to both sides.
+    bool isTranslucent() const {
+        return type == MaterialType::Plastic && (transmittance || transmittance_texture != kNoTexture);
     }
     /// True if something that it mirrors or lets through is tinted.
     bool isTinted() const {
@@ -123,7 +136,9 @@ struct Material {
         return mirrors && (tint || tint_texture != kNoTexture);
     }
     /// True if light comes out on the other side.
-    bool transmits() const {
+    bool transmits() const { return isClear() || isTranslucent(); }
+    /// True if it comes out there as through glass.
+    bool isClear() const {
         return type == MaterialType::Dielectric || type == MaterialType::RoughDielectric ||
                type == MaterialType::ThinDielectric;
     }
@@ -149,10 +164,10 @@ void visitMembers(const Clearcoat& coat, const Visit& visit) {
 template <class Visit>
 void visitMembers(const Material& material, const Visit& visit) {
     const auto& [name, type, reflectance, eta, k, absorption, roughness, by_color, edge_tint, weight, tint,
-                 tint_texture, anisotropy, anisotropy_rotation_deg, film_thickness_nm, film_index,
-                 reflectance_texture, roughness_texture, film_texture, place, opacity, opacity_texture,
-                 parts, normal_texture, normal_strength, amount, amount_texture, emission, diffuse_roughness,
-                 fuzz, fuzz_color, fuzz_roughness, clearcoat] = material;
+                 tint_texture, transmittance, transmittance_texture, anisotropy, anisotropy_rotation_deg,
+                 film_thickness_nm, film_index, reflectance_texture, roughness_texture, film_texture, place,
+                 opacity, opacity_texture, parts, normal_texture, normal_strength, amount, amount_texture,
+                 emission, diffuse_roughness, fuzz, fuzz_color, fuzz_roughness, clearcoat] = material;
     visit(type);
     visit(by_color);
     for (const Spectrum* spectrum : {&reflectance, &eta, &k, &edge_tint, &film_index, &fuzz_color})
@@ -160,11 +175,12 @@ void visitMembers(const Material& material, const Visit& visit) {
     for (const double number : {roughness, weight, anisotropy, anisotropy_rotation_deg, film_thickness_nm,
                                 opacity, normal_strength, amount, diffuse_roughness, fuzz, fuzz_roughness})
         visit(number);
-    for (const TextureIndex texture : {reflectance_texture, roughness_texture, tint_texture, film_texture,
-                                       opacity_texture, normal_texture, amount_texture})
+    for (const TextureIndex texture :
+         {reflectance_texture, transmittance_texture, roughness_texture, tint_texture, film_texture,
+          opacity_texture, normal_texture, amount_texture})
         visit(texture);
     for (const std::int32_t index : {parts[0], parts[1], emission}) visit(index);
-    for (const std::optional<Spectrum>* spectrum : {&absorption, &tint}) {
+    for (const std::optional<Spectrum>* spectrum : {&absorption, &tint, &transmittance}) {
         visit(spectrum->has_value());
         if (*spectrum) visit(**spectrum);
     }

@@ -115,6 +115,8 @@ inline constexpr std::uint32_t kNoUv = 0xffffffffu;
 struct Emission {
     Spectrum radiance;  ///< W·m⁻²·sr⁻¹·nm⁻¹
     bool two_sided = false;
+    /// An image whose factor is the radiance, in place of it. Not of shapes.
+    TextureIndex texture = kNoTexture;
 };
 
 enum class QuadricType { Sphere, Disk, Cylinder };

@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -67,6 +68,8 @@ struct Texture {
     TextureWrap wrap = TextureWrap::Repeat;
     std::array<TextureValue, 2> values;  ///< Patterns. Textures among them come before this one.
     std::vector<double> numbers;         ///< Patterns: of their keys, in the order of the schema.
+    /// Images of spectra: what the texels are multiplied with, at most colours of vertices that come before.
+    std::optional<TextureValue> factor;
     /// Texture coordinates → those of the image, both with v up: rows of two and an offset, (u', v') = (m0
     /// u + m1 v + m2, m3 u + m4 v + m5). The image is the unit square, as are the squares of a checker.
     std::array<double, 6> transform{1, 0, 0, 0, 1, 0};

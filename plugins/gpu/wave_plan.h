@@ -41,9 +41,9 @@ const Row* rowsOf(const void* blob, const kernel::CrtSpan& span) {
 }
 
 /// Features that some materials have and others lack.
-constexpr std::uint64_t kOfMaterials = CRT_FEATURES_MATERIALS | CRT_FEATURE_THIN_FILM |
-                                       CRT_FEATURE_ANISOTROPY | CRT_FEATURE_NORMAL_MAP | CRT_FEATURE_FUZZ |
-                                       CRT_FEATURE_CLEARCOAT | CRT_FEATURE_ROUGH_BASE;
+constexpr std::uint64_t kOfMaterials =
+    CRT_FEATURES_MATERIALS | CRT_FEATURE_THIN_FILM | CRT_FEATURE_ANISOTROPY | CRT_FEATURE_NORMAL_MAP |
+    CRT_FEATURE_FUZZ | CRT_FEATURE_CLEARCOAT | CRT_FEATURE_ROUGH_BASE | CRT_FEATURE_TRANSLUCENT;
 
 /// Of these, what the material of that number has.
 inline std::uint64_t featuresOfMaterial(const void* blob, std::uint32_t number) {
@@ -54,6 +54,7 @@ inline std::uint64_t featuresOfMaterial(const void* blob, std::uint32_t number) 
     const auto note = [&](std::uint64_t feature, bool has) { features |= has ? feature : 0; };
     note(CRT_FEATURE_THIN_FILM, material.film_thickness != 0);
     note(CRT_FEATURE_ANISOTROPY, material.narrowing > 0);
+    note(CRT_FEATURE_TRANSLUCENT, (material.flags & CRT_MATERIAL_TRANSLUCENT) != 0);
     if (scene.compositions.count != 0)
         note(CRT_FEATURE_NORMAL_MAP,
              rowsOf<CrtComposition>(blob, scene.compositions)[number].normal_map != 0);

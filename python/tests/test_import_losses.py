@@ -150,10 +150,11 @@ def test_an_image_that_emits_and_cannot_be_read_is_white_and_said(tmp_path):
         assert made.content["objects"][0]["emission"]["radiance"] == {"illuminant": "D65", "scale": 1.0}
 
 
-def test_curtains_that_let_no_light_through_are_a_large_loss(tmp_path):
-    losses = of_pbrt(tmp_path, "", 'Material "diffusetransmission" "rgb transmittance" [0.5 0.5 0.5] '
-                                   '"float scale" 1\n' + SPHERE)
-    assert said(losses) == [("material 'diffusetransmission'", "diffuse without transmission", True)]
+def test_curtains_that_would_make_light_are_a_loss(tmp_path):
+    losses = of_pbrt(tmp_path, "", 'Material "diffusetransmission" "rgb reflectance" [0.75 0.75 0.75] '
+                                   '"rgb transmittance" [0.5 0.5 0.5]\n' + SPHERE)
+    assert said(losses) == [("reflectance and transmittance of material 'diffusetransmission' above 1 "
+                             "together", "as much less of both", False)]
 
 
 @pytest.mark.parametrize("given, wanted", [

@@ -36,6 +36,31 @@ def bsdf(folder, xml):
     return content["materials"], content["materials"][content["objects"][0]["material"]]
 
 
+def test_a_thin_principled_bsdf_is_a_sheet(tmp_path):
+    _, made = bsdf(tmp_path, '<bsdf type="principledthin"><rgb name="base_color" value="0.4 0.4 0.4"/>'
+                             '<float name="diff_trans" value="1.5"/></bsdf>')
+    assert made == {"type": "openpbr", "base_color": 0.4, "specular_roughness": 0.5,
+                    "geometry_thin_walled": True, "subsurface_weight": 1, "subsurface_color": 0.4,
+                    "subsurface_scatter_anisotropy": 0.5}
+
+
+@pytest.mark.parametrize("shape", ["rectangle", "sphere"])
+def test_a_bitmap_that_emits_stays_an_image(tmp_path, shape):
+    """Its brightest number is the radiance, and a sphere a mesh."""
+    pixels = np.zeros((2, 2, 3), np.float32)
+    pixels[0, 1] = [8, 4, 2]
+    written(tmp_path, "a.pfm", pfm(pixels))
+    path = scene(tmp_path, f'<shape type="{shape}"><emitter type="area"><texture type="bitmap" '
+                           'name="radiance"><string name="filename" value="a.pfm"/>'
+                           '<string name="filter_type" value="nearest"/></texture></emitter></shape>')
+    made = crt.import_scene(path)
+    emission = made.content["objects"][0]["emission"]
+    assert emission["radiance"] == {"rgb": [1, 1, 1], "space": "linear", "scale": 8}
+    assert emission["color"]["filter"] == "nearest"
+    assert "mesh" in made.content["objects"][0]
+    assert not [loss for loss in made.losses if "emits" in loss.what]
+
+
 def test_the_same_bits_as_a_scene_by_hand(tmp_path):
     path = scene(tmp_path, """
         <bsdf type="twosided" id="paint"><bsdf type="diffuse">

@@ -215,6 +215,10 @@ def test_bilinear_patches_and_parts_of_shapes(tmp_path):
     ('Material "dielectric"', {"type": "dielectric", "ior": 1.5}),
     ('Material "dielectric" "spectrum eta" "glass-BK7"', {"type": "dielectric", "ior": {"glass": "N-BK7"}}),
     ('Material "thindielectric" "float eta" 1.3', {"type": "thin_dielectric", "ior": 1.3}),
+    ('Material "diffusetransmission" "rgb reflectance" [.2 .2 .2] "rgb transmittance" [.1 .1 .1] '
+     '"float scale" 2', {"type": "translucent", "reflectance": 0.4, "transmittance": 0.2}),
+    ('Material "diffusetransmission"',
+     {"type": "translucent", "reflectance": 0.25, "transmittance": 0.25}),
     ('Material "coateddiffuse" "rgb reflectance" [.2 .2 .2] "float roughness" 0.0625',
      {"type": "plastic", "reflectance": 0.2, "roughness": 0.5, "ior": 1.5}),
     ('MakeNamedMaterial "a" "string type" "diffuse" "rgb reflectance" [.1 .1 .1]\n'

@@ -72,7 +72,10 @@
     F(41, SHAPES, "spheres, disks and cylinders")                                            \
     F(42, SPLAT, "splats: samples that add to other pixels than their own")                  \
     F(43, COAT_TEXTURE, "gloss and coats whose roughness depends on the place")              \
-    F(44, TINT, "colours of mirrors, gloss and panes beside those of Fresnel's equations")
+    F(44, TINT, "colours of mirrors, gloss and panes beside those of Fresnel's equations")   \
+    F(45, TRANSLUCENT, "thin sheets that let light through diffusely")                       \
+    F(46, FACTOR, "images times a spectrum or colours of vertices")                          \
+    F(47, EMISSION_IMAGE, "emission that depends on the place")
 
 #define CRT_FEATURE_NUMBER(bit, name, text) CRT_BIT_##name = bit,
 enum CrtFeatureNumber { CRT_FEATURE_LIST(CRT_FEATURE_NUMBER) };

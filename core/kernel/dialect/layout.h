@@ -209,7 +209,9 @@ typedef struct CrtTexture {
     u32 width, height;
     u32 wrap;    /* CRT_WRAP_…: what lies beyond the image */
     u32 nearest; /* 1: the texel that a place lies in; 0: bilinear between the four around it */
-    CrtValue first, second; /* of a pattern; entries before this one where they are textures */
+    CrtValue first, second; /* of a pattern; entries before this one where they are textures. Of an image
+                               `first` is a factor on its texels: a number, a table or the colours of the
+                               vertices; 0: there is none */
     u32 reserved;
     CrtSpan words; /* of 16 bits: the texels of an image, the top row first; of a pattern its numbers, f32 */
     f32 from_uv[6]; /* (s, t) = (f0 u + f1 v + f2, f3 u + f4 v + f5): of images the upper left corner is
@@ -222,6 +224,7 @@ CRT_ASSERT_SIZE(CrtTexture, 64);
 #define CRT_MATERIAL_OPENPBR 4u /* rough conductors and plastic: by the colours that are seen (openpbr.h) */
 #define CRT_MATERIAL_UNDER_COAT 8u /* its roughness grows by that of the coat, vertex by vertex */
 #define CRT_MATERIAL_TINTED 16u    /* it has a tint (tint.h) */
+#define CRT_MATERIAL_TRANSLUCENT 32u /* plastic: a thin sheet with a transmittance (plastic.h) */
 
 /* Steps between the cosines 0 and 1 of a coat's table, which is as long as a spectrum's. */
 #define CRT_COAT_STEPS 470.0f
@@ -328,8 +331,9 @@ typedef struct CrtLayers {
     CrtValue clear_base;    /* how rough what lies below is, to that end: this times */
     f32 clear_base_share;   /* this, and the rest as rough as can be */
     CrtValue tint;          /* of what is CRT_MATERIAL_TINTED */
+    CrtValue transmittance; /* of what is CRT_MATERIAL_TRANSLUCENT: of its base, beside the reflectance */
 } CrtLayers;
-CRT_ASSERT_SIZE(CrtLayers, 64);
+CRT_ASSERT_SIZE(CrtLayers, 68);
 
 #define CRT_LIGHT_TRIANGLE 0u
 #define CRT_LIGHT_PARALLELOGRAM 1u /* two triangles */
@@ -343,6 +347,7 @@ CRT_ASSERT_SIZE(CrtLayers, 64);
 #define CRT_LIGHT_DISK_BEAM 8u
 #define CRT_LIGHT_SLIT_BEAM 9u
 #define CRT_LIGHT_SHAPE 10u /* a sphere, a disk, a cylinder, or a part of one */
+#define CRT_LIGHT_TILE 11u  /* a part of a triangle whose radiance is a texture (light.h) */
 
 #define CRT_LIGHT_TWO_SIDED 1u
 #define CRT_LIGHT_UNSAMPLED 2u /* left to scattered rays: its surface is not all there */
@@ -355,10 +360,22 @@ typedef struct CrtLight {
                                tree: 4 times the node + which child */
     f32 choice_probability; /* exactly the share of 2³² that chooses it, or the tree that it is in */
     u32 slot;   /* in the triangle array */
-    u32 corner; /* which vertex of the triangle the parallelogram's two edges leave from */
+    u32 corner; /* which vertex of the triangle the parallelogram's two edges leave from; of a tile, by
+                   CRT_TILE: which one it is */
     f32 area;
 } CrtLight;
 CRT_ASSERT_SIZE(CrtLight, 32);
+
+/* A triangle with `rows` tiles along each edge has rows² of them, alike and one behind the other among the
+   lights: row by row along its second edge, and in each row along its first, those that lie as the triangle
+   does and those that lie upside down in turn. */
+#define CRT_TILE(rows, row, place) ((rows) << 20u | (row) << 10u | (place))
+#define CRT_TILE_ROWS(corner) ((corner) >> 20u)
+#define CRT_TILE_ROW(corner) ((corner) >> 10u & 1023u)
+#define CRT_TILE_PLACE(corner) ((corner)&1023u)
+#define CRT_TILE_ROWS_MAX 256u
+/* The tiles of the rows before `row`. */
+#define CRT_TILES_BEFORE(rows, row) ((row) * (2u * (rows) - (row)))
 
 /* A node of the tree of lights, the root first. Of each of its four children, what lights are below it:
    where they are, and which way they shine: within acos(cos_o) + acos(cos_e) of the axis. */

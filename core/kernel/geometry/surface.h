@@ -198,6 +198,21 @@ CRT_FN vec3 crt_placed_normal(const CrtContext *ctx, u32 instance, vec3 n) {
     return placed / length3(placed);
 }
 
+/* The place of barycentrics on the triangle of a primitive. */
+CRT_FN CrtFacePlace crt_face_place(const CrtContext *ctx, u32 id, f32 b0, f32 b1, f32 b2) {
+    CrtFacePlace at;
+    at.id = id;
+    at.b1 = b1;
+    at.b2 = b2;
+    at.u = at.v = 0.0f;
+    if (ctx->scene->uvs.count != 0u) {
+        CRT_GLOBAL const f32 *uv = CRT_ARRAY(CrtUvs, ctx->blob, ctx->scene->uvs)[id].uv;
+        at.u = crt_fma(uv[0], b0, crt_fma(uv[1], b1, uv[2] * b2));
+        at.v = crt_fma(uv[3], b0, crt_fma(uv[4], b1, uv[5] * b2));
+    }
+    return at;
+}
+
 CRT_HOT_FN CrtSurface crt_surface(const CrtContext *ctx, CrtHit hit) {
     CRT_GLOBAL const CrtTriangle *triangle =
         CRT_ARRAY(CrtTriangle, ctx->blob, ctx->scene->triangles) + hit.slot;
@@ -233,17 +248,10 @@ CRT_HOT_FN CrtSurface crt_surface(const CrtContext *ctx, CrtHit hit) {
     s.light = primitive->light;
     if (CRT_HAS(ANISOTROPY)) s.slot = hit.slot;
     if (CRT_HAS(INSTANCES)) s.instance = hit.instance;
-    if (CRT_HAS(TEXTURE) || CRT_HAS(ANISOTROPY)) s.at.id = id;
-    if (CRT_HAS(TEXTURE)) {
-        s.at.b1 = b1;
-        s.at.b2 = b2;
-        s.at.u = s.at.v = 0.0f;
-        if (ctx->scene->uvs.count != 0u) {
-            CRT_GLOBAL const f32 *uv = CRT_ARRAY(CrtUvs, ctx->blob, ctx->scene->uvs)[id].uv;
-            s.at.u = crt_fma(uv[0], b0, crt_fma(uv[1], b1, uv[2] * b2));
-            s.at.v = crt_fma(uv[3], b0, crt_fma(uv[4], b1, uv[5] * b2));
-        }
-    }
+    if (CRT_HAS(TEXTURE))
+        s.at = crt_face_place(ctx, id, b0, b1, b2);
+    else if (CRT_HAS(ANISOTROPY))
+        s.at.id = id;
     if (CRT_HAS(SMOOTH_NORMALS) && primitive->normals != CRT_NONE) {
         CRT_GLOBAL const CrtNormals *n =
             CRT_ARRAY(CrtNormals, ctx->blob, ctx->scene->normals) + primitive->normals;

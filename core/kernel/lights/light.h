@@ -2,9 +2,10 @@
  * light.h: sampling the lights: crt_light_choose, then crt_light_sample and crt_light_pdf for emitters,
  * crt_environment_sample and crt_environment_pdf for the environment. One emissive triangle, or two that
  * make a parallelogram, is one light, chosen by power, and so is the environment in scenes that request
- * this. crt_light_view decides how a point on a light is sampled, by the shaded point and the light alone,
- * for both sampling and the pdf: uniformly in solid angle where the light looks large, else uniformly on
- * its area; where neither works, scattered rays alone find it.
+ * this. A triangle whose radiance is a texture is many lights, its tiles, each chosen by its own power, so
+ * that bright texels are found. crt_light_view decides how a point on a light is sampled, by the shaded
+ * point and the light alone, for both sampling and the pdf: uniformly in solid angle where the light looks
+ * large, else uniformly on its area; where neither works, scattered rays alone find it.
  */
 #ifndef CRT_LIGHT_H
 #define CRT_LIGHT_H
@@ -69,11 +70,27 @@ typedef struct CrtLightShape {
     int parallelogram;
 } CrtLightShape;
 
+/* The tile of a triangle that has the shape s. */
+CRT_FN CrtLightShape crt_tile_shape(CrtLightShape s, u32 corner) {
+    const f32 share = 1.0f / (f32)CRT_TILE_ROWS(corner);
+    const u32 place = CRT_TILE_PLACE(corner), upside_down = place & 1u;
+    s.a = s.a * share;
+    s.b = s.b * share;
+    s.o = crt_fma3(s.a, (f32)((place >> 1u) + upside_down),
+                   crt_fma3(s.b, (f32)(CRT_TILE_ROW(corner) + upside_down), s.o));
+    if (upside_down != 0u) {
+        s.a = -s.a;
+        s.b = -s.b;
+    }
+    return s;
+}
+
 CRT_FN CrtLightShape crt_light_shape(const CrtContext *ctx, CRT_GLOBAL const CrtLight *emitter) {
     CRT_GLOBAL const CrtTriangle *triangle =
         CRT_ARRAY(CrtTriangle, ctx->blob, ctx->scene->triangles) + emitter->slot;
     CRT_GLOBAL const CrtFace *face = CRT_ARRAY(CrtFace, ctx->blob, ctx->scene->faces) + emitter->slot;
-    const u32 corner = emitter->corner;
+    const int tile = CRT_HAS(EMISSION_IMAGE) && emitter->kind == CRT_LIGHT_TILE;
+    const u32 corner = tile ? 0u : emitter->corner;
     CrtLightShape s;
     s.o = crt_triangle_vertex(triangle, corner);
     s.a = crt_triangle_vertex(triangle, corner == 2u ? 0u : corner + 1u) - s.o;
@@ -81,7 +98,38 @@ CRT_FN CrtLightShape crt_light_shape(const CrtContext *ctx, CRT_GLOBAL const Crt
     s.normal = crt_load3(face->normal);
     s.area = emitter->area;
     s.parallelogram = emitter->kind == CRT_LIGHT_PARALLELOGRAM;
-    return s;
+    return tile ? crt_tile_shape(s, emitter->corner) : s;
+}
+
+/* The row of the light table that a place on an emitter belongs to. */
+CRT_FN u32 crt_light_at(const CrtContext *ctx, const CrtSurface *surface) {
+    if (!CRT_HAS(EMISSION_IMAGE)) return surface->light;
+    CRT_GLOBAL const CrtLight *first = CRT_ARRAY(CrtLight, ctx->blob, ctx->scene->lights) + surface->light;
+    if (first->kind != CRT_LIGHT_TILE) return surface->light;
+    const u32 rows = CRT_TILE_ROWS(first->corner), last = rows - 1u;
+    const f32 x = surface->at.b1 * (f32)rows, y = surface->at.b2 * (f32)rows;
+    u32 row = (u32)y, column = (u32)x;
+    if (row > last) row = last;
+    if (column > last - row) column = last - row;
+    const int beyond = x - (f32)column + (y - (f32)row) > 1.0f;
+    return surface->light + CRT_TILES_BEFORE(rows, row) + 2u * column +
+           (beyond && column + row < last ? 1u : 0u);
+}
+
+/* The radiance of an emitter at a point of it, at the path's wavelengths. */
+CRT_FN vec4 crt_emitted(const CrtContext *ctx, CRT_GLOBAL const CrtLight *light, vec3 point, vec4 position) {
+    if (!CRT_HAS(EMISSION_IMAGE) || light->kind != CRT_LIGHT_TILE)
+        return crt_value(ctx, light->radiance, 0, position);
+    CRT_GLOBAL const CrtTriangle *triangle =
+        CRT_ARRAY(CrtTriangle, ctx->blob, ctx->scene->triangles) + light->slot;
+    const vec3 o = crt_triangle_vertex(triangle, 0u), d = point - o;
+    const vec3 a = crt_triangle_vertex(triangle, 1u) - o, b = crt_triangle_vertex(triangle, 2u) - o;
+    const vec3 n = cross3(a, b);
+    const f32 scale = 1.0f / dot3(n, n);
+    const f32 b1 = crt_clamp(dot3(cross3(d, b), n) * scale, 0.0f, 1.0f);
+    const f32 b2 = crt_clamp(dot3(cross3(a, d), n) * scale, 0.0f, 1.0f - b1);
+    const CrtFacePlace at = crt_face_place(ctx, triangle->id, 1.0f - b1 - b2, b1, b2);
+    return crt_value_at(ctx, light->radiance, &at, position);
 }
 
 CRT_FN int crt_seen_large(CrtLightShape shape, vec3 p) {

@@ -35,6 +35,26 @@ CRT_FN f32 crt_own_roughness(const CrtContext *ctx, const CrtMaterial *material,
     return crt_min(crt_sqrt(crt_sqrt(width * width + 2.0f * (coat_width * coat_width))), 1.0f);
 }
 
+/* The share of entering light that a translucent sheet sends to its other side, at most the rest of what it
+   reflects; 0 for others. *returned: the share that it sends back, set for translucent ones. `base`, `k`: a
+   and k of plastic.h. */
+CRT_FN vec4 crt_prepare_sheet(const CrtContext *ctx, CrtBsdf *b, const CrtMaterial *material,
+                              const CrtSurface *surface, vec4 position, vec4 base, f32 k, vec4 *returned) {
+    b->pass_chance = 0.0f;
+    b->passed = splat4(0.0f);
+    if ((material->flags & CRT_MATERIAL_TRANSLUCENT) == 0u) return splat4(0.0f);
+    b->flags |= CRT_BSDF_TRANSMITS;
+    CRT_GLOBAL const CrtLayers *layers =
+        CRT_ARRAY(CrtLayers, ctx->blob, ctx->scene->layers) + surface->material;
+    const vec4 through = crt_value(ctx, layers->transmittance, surface, position);
+    vec4 passed = crt_min4(through, splat4(1.0f) - base);
+    if ((material->flags & CRT_MATERIAL_OPENPBR) == 0u)
+        *returned = crt_sheet_returns(base, passed, k, &passed);
+    const f32 here = sum4(*returned), there = sum4(passed);
+    b->pass_chance = there > 0.0f ? there / (here + there) : 0.0f;
+    return passed;
+}
+
 /* Prepares the BSDF of the material of `surface`, for light that leaves along wo. `carried`: the path's
    throughput, which weights the choice between wavelengths. `albedo`: also computes the albedo, which the
    first vertex needs. */
@@ -161,8 +181,15 @@ CRT_FN void crt_bsdf_prepare(const CrtContext *ctx, CrtBsdf *b, const CrtSurface
                 vec4 returned = base * (1.0f - k) / (splat4(1.0f) - base * k);
                 if ((material.flags & CRT_MATERIAL_OPENPBR) != 0u) returned = base;
                 const f32 mirrored = crt_coat_albedo(b, dot3(wo, b->ns));
-                const f32 scattered = 0.25f * sum4(returned) * (1.0f - mirrored);
+                vec4 passed = splat4(0.0f);
+                if (CRT_HAS(TRANSLUCENT))
+                    passed = crt_prepare_sheet(ctx, b, &material, surface, position, base, k, &returned);
+                f32 scattered = 0.25f * sum4(returned) * (1.0f - mirrored);
                 b->reflectance = returned * ((1.0f - mirrored) / ((1.0f - k) * eta * eta));
+                if (crt_is_translucent(b)) {
+                    scattered = scattered + 0.25f * sum4(passed) * (1.0f - mirrored);
+                    b->passed = passed * ((1.0f - mirrored) / ((1.0f - k) * eta * eta));
+                }
                 if (CRT_HAS(ROUGH_BASE))
                     returned = crt_prepare_rough_base(ctx, b, surface->material, returned,
                                                       (1.0f - k) * eta * eta);
@@ -174,7 +201,7 @@ CRT_FN void crt_bsdf_prepare(const CrtContext *ctx, CrtBsdf *b, const CrtSurface
                 b->coat_chance = seen > 0.0f ? seen / (seen + scattered) : 0.0f;
                 if (albedo) {
                     const f32 facing = crt_coat_albedo(b, 1.0f);
-                    b->albedo = crt_tinted(b, splat4(facing)) + returned * (1.0f - facing);
+                    b->albedo = crt_tinted(b, splat4(facing)) + (returned + passed) * (1.0f - facing);
                 }
             }
             break;

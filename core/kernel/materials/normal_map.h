@@ -11,7 +11,8 @@
  * walls cast no shadow.
  *
  * Surfaces that transmit have no walls: there the mapped normal stands in the place of the other, and what
- * would leave to the wrong side is mirrored by the face (crt_to_its_side).
+ * would leave to the wrong side is mirrored by the face (crt_to_its_side). A translucent sheet raises its
+ * light on either side, as about an interpolated normal.
  */
 #ifndef CRT_NORMAL_MAP_H
 #define CRT_NORMAL_MAP_H
@@ -91,8 +92,9 @@ CRT_FN vec3 crt_base(const CrtBsdf *b) { return crt_is_facet(b) ? b->base : b->n
 /* Cosine of a scattered direction with the base; or, where that is below it, less the one with the side. */
 CRT_FN f32 crt_scatter_cosine(const CrtBsdf *b, vec3 wi) {
     const f32 cosine = dot3(wi, crt_base(b));
-    if (!CRT_HAS(SMOOTH_NORMALS) || cosine > 0.0f) return cosine;
+    if (!CRT_HAS(SMOOTH_NORMALS) || (!CRT_HAS(TRANSLUCENT) && cosine > 0.0f)) return cosine;
     const f32 above = dot3(wi, crt_side(b));
+    if (CRT_HAS(TRANSLUCENT) && cosine > 0.0f) return crt_is_translucent(b) && above < 0.0f ? above : cosine;
     return above > 0.0f ? -above : cosine;
 }
 

@@ -10,6 +10,16 @@
  * `roughplastic` with `nonlinear` (Jakob et al. 2022), whose tables of transmittance are here E of
  * microfacets that mirror once: what they lose enters. It is reciprocal, and a white base sends all light
  * back. A tint (tint.h) is on f_coat alone.
+ *
+ * A base with a transmittance t beside its reflectance is a thin sheet with the same coat on both of its
+ * sides. Light that it scatters to the other side leaves there, except for the share that this side's
+ * coat sends back. With
+ * D and B the light inside that goes to this side's coat and to the other's, of E that has entered,
+ *
+ *     D = a (E + k D) + t k B,    B = t (E + k D) + a k B
+ *
+ * so that D ± B = (a ± t) E / (1 − (a ± t) k). The share 1 − k of each leaves. Without a coat, a and
+ * t are what is seen: Lambert's law on both sides.
  */
 #ifndef CRT_PLASTIC_H
 #define CRT_PLASTIC_H
@@ -27,9 +37,37 @@ CRT_FN f32 crt_coat_albedo(const CrtBsdf *b, f32 cosine) {
     return crt_coat_reflects(b->coat, crt_min(cosine, 1.0f), V4X(b->eta));
 }
 
-/* f·|cos| without what a smooth coat mirrors, and its density. About an interpolated normal, what the base
-   sends below the surface is raised (shading_normal.h). */
-CRT_FN vec4 crt_plastic(const CrtBsdf *b, vec3 wi, f32 *pdf) {
+/* Of the base that reflects `a` and transmits `t`, under a coat that sends back `k` from below: what leaves
+   of what has entered, on this side; *passed: on the other one. */
+CRT_FN vec4 crt_sheet_returns(vec4 a, vec4 t, f32 k, vec4 *passed) {
+    const vec4 sum = a + t, difference = a - t;
+    const vec4 both = sum * (1.0f - k) / (splat4(1.0f) - sum * k);
+    const vec4 apart = difference * (1.0f - k) / (splat4(1.0f) - difference * k);
+    *passed = (both - apart) * 0.5f;
+    return (both + apart) * 0.5f;
+}
+
+/* f·|cos| towards the other side of a translucent sheet, and its density: as what the base reflects towards
+   the opposite direction. */
+CRT_FN vec4 crt_plastic_passed(const CrtBsdf *b, vec3 wi, f32 *pdf) {
+    const vec3 w = -wi;
+    const f32 cos_i = dot3(w, b->ns), cos_g = dot3(w, b->ng);
+    const f32 below = crt_below(b);
+    f32 lambert = crt_lambert(cos_i);
+    f32 leaving = cos_i > 0.0f ? (1.0f - crt_coat_albedo(b, cos_i)) * lambert : 0.0f;
+    if (below > 0.0f) {
+        const f32 raised = below * crt_lambert(cos_g);
+        lambert = lambert + raised;
+        leaving =
+            leaving + (1.0f - crt_coat_albedo(b, crt_cosine_before_lift(below, cos_i, cos_g))) * raised;
+    }
+    *pdf = (1.0f - b->coat_chance) * b->pass_chance * lambert;
+    return b->passed * leaving;
+}
+
+/* f·|cos| without what a smooth coat mirrors, and its density, on the side of w_o. About an interpolated
+   normal, what the base sends below the surface is raised (shading_normal.h). */
+CRT_FN vec4 crt_plastic_reflected(const CrtBsdf *b, vec3 wi, f32 *pdf) {
     const f32 cos_i = dot3(wi, b->ns);
     const f32 below = crt_below(b);
     f32 lambert = crt_lambert(cos_i);
@@ -52,6 +90,7 @@ CRT_FN vec4 crt_plastic(const CrtBsdf *b, vec3 wi, f32 *pdf) {
     }
     const vec4 base = crt_has_rough_base(b) ? rough : b->reflectance * entering;
     *pdf = (1.0f - b->coat_chance) * lambert;
+    if (crt_is_translucent(b)) *pdf = *pdf * (1.0f - b->pass_chance);
     if (!crt_is_rough_coat(b->coat) || !(cos_i > 0.0f)) return base;
     const CrtMicrofacet m = crt_microfacet(b, wi);
     if (!(m.cos_o > 0.0f)) return base;
@@ -60,8 +99,14 @@ CRT_FN vec4 crt_plastic(const CrtBsdf *b, vec3 wi, f32 *pdf) {
                                        (2.0f * (m.root_o * m.cos_i + m.root_i * m.cos_o))));
 }
 
-/* `choice`: of coat and base. Light that a smooth coat mirrors has the density 0 of a delta; the rest has
-   that of the base alone, which light sampling competes with. */
+/* The same on both sides. */
+CRT_FN vec4 crt_plastic(const CrtBsdf *b, vec3 wi, f32 *pdf) {
+    if (crt_is_translucent(b) && dot3(wi, b->ng) < 0.0f) return crt_plastic_passed(b, wi, pdf);
+    return crt_plastic_reflected(b, wi, pdf);
+}
+
+/* `choice`: of coat, base and the base's other side. Light that a smooth coat mirrors has the density 0 of a
+   delta; the rest has that of the base alone, which light sampling competes with. */
 CRT_FN CrtScatter crt_sample_plastic(const CrtBsdf *b, CrtRandom2 u, f32 choice) {
     CrtScatter s = crt_no_scatter();
     if (choice < b->coat_chance) {
@@ -73,8 +118,15 @@ CRT_FN CrtScatter crt_sample_plastic(const CrtBsdf *b, CrtRandom2 u, f32 choice)
     } else {
         s.wi = crt_lift(b, crt_cosine_direction(b->ns, u));
         s.valid = dot3(s.wi, b->ng) > 0.0f;
+        if (crt_is_translucent(b) && crt_rescaled(choice, b->coat_chance) < b->pass_chance) {
+            s.wi = -s.wi;
+            const vec4 passed = crt_plastic_passed(b, s.wi, &s.pdf);
+            s.valid = s.valid && s.pdf > 0.0f;
+            if (s.valid) s.weight = passed / s.pdf;
+            return s;
+        }
     }
-    const vec4 value = crt_plastic(b, s.wi, &s.pdf);
+    const vec4 value = crt_plastic_reflected(b, s.wi, &s.pdf);
     s.valid = s.valid && s.pdf > 0.0f;
     if (s.valid) s.weight = value / s.pdf;
     return crt_mirror_up(b, s);

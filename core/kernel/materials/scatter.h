@@ -72,6 +72,8 @@ typedef struct CrtBsdf {
     CrtLosses losses; /* rough */
     vec4 tint;        /* metals and plastic: on what is mirrored (tint.h) */
     f32 coat_chance;  /* plastic: of sampling the coat */
+    f32 pass_chance;  /* translucent plastic: of what the base scatters, of sampling the other side; */
+    vec4 passed;      /* of that side, as `reflectance` of this one */
     CrtCoat coat;     /* plastic: what it reflects by the cosine */
     CRT_GLOBAL const f32 *base_loss; /* plastic: table of its rough base; 0: Lambert's; otherwise: */
     f32 base_roughness;

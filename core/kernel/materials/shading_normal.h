@@ -24,6 +24,12 @@ CRT_KERNEL_BEGIN
 
 CRT_FN vec3 crt_mirrored(vec3 v, vec3 n) { return crt_fma3(n, -2.0f * dot3(v, n), v); }
 
+/* True if it scatters Lambert's light to both sides. */
+CRT_FN int crt_is_translucent(const CrtBsdf *b) {
+    const u32 both = CRT_BSDF_TRANSMITS | CRT_BSDF_RAISES;
+    return CRT_HAS(TRANSLUCENT) && (b->flags & both) == both;
+}
+
 CRT_FN int crt_is_facet(const CrtBsdf *b) { return CRT_HAS(NORMAL_MAP) && b->facet; }
 
 /* Kinds of materials that reflect alone, in a lobe other than Lambert's. */

@@ -72,8 +72,9 @@ CRT_FN CrtDirectSample crt_direct_sample_of(const CrtContext *ctx, u32 light, Cr
         direct.irradiance = sampled ? 1.0f / s.pdf : 0.0f;
         return direct;
     }
-    if (CRT_HAS(POINT_LIGHT) && !crt_is_shape_light(ctx, direct.light) &&
-        CRT_ARRAY(CrtLight, ctx->blob, ctx->scene->lights)[direct.light].kind >= CRT_LIGHT_POINT) {
+    const u32 kind = CRT_ARRAY(CrtLight, ctx->blob, ctx->scene->lights)[direct.light].kind;
+    if (CRT_HAS(POINT_LIGHT) && kind >= CRT_LIGHT_POINT && kind != CRT_LIGHT_SHAPE &&
+        kind != CRT_LIGHT_TILE) {
         const CrtPointLightSample s = crt_point_light_sample(ctx, direct.light, sampler, dimension, p);
         direct.wi = s.wi;
         direct.pdf = s.pdf;
@@ -151,8 +152,8 @@ CRT_FN void crt_sample_lights(const CrtContext *ctx, CrtPath *path, const CrtVer
     const vec4 light =
         direct.environment
             ? crt_environment_radiance(ctx, direct.place, position)
-            : crt_value(ctx, CRT_ARRAY(CrtLight, ctx->blob, ctx->scene->lights)[direct.light].radiance, 0,
-                        position);
+            : crt_emitted(ctx, CRT_ARRAY(CrtLight, ctx->blob, ctx->scene->lights) + direct.light,
+                          direct.point, position);
     shadow->radiance = path->throughput * scattered * light * weight;
     if (CRT_HAS(MEDIA)) crt_absorb_shadow(ctx, path, vertex, direct.wi, direct.distance, shadow);
 }

@@ -14,20 +14,19 @@ CRT_KERNEL_BEGIN
 
 /* Emission met by the ray, weighted against the chance that light sampling had found it. */
 CRT_FN void crt_add_emission(const CrtContext *ctx, CrtPath *path, const CrtSurface *surface, f32 t) {
-    CRT_GLOBAL const CrtLight *emitter =
-        CRT_ARRAY(CrtLight, ctx->blob, ctx->scene->lights) + surface->light;
+    const u32 index = crt_light_at(ctx, surface);
+    CRT_GLOBAL const CrtLight *emitter = CRT_ARRAY(CrtLight, ctx->blob, ctx->scene->lights) + index;
     const int front = dot3(surface->ng, path->ray.d) < 0.0f;
     if (!front && (emitter->flags & CRT_LIGHT_TWO_SIDED) == 0u) return;
     f32 weight = 1.0f;
     if (CRT_HAS(NEE) && ctx->scene->nee != CRT_NEE_NONE && path->scatter_pdf > 0.0f) {
         const f32 distance = length3(crt_fma3(path->ray.d, t, path->ray.o) - path->p);
-        CrtLightSeen light =
-            crt_is_shape_light(ctx, surface->light)
-                ? crt_shape_light_pdf(ctx, surface->light, path->p,
-                                      crt_fma3(path->ray.d, t, path->ray.o), surface->ng)
-                : crt_light_pdf(ctx, surface->light, path->p, distance);
+        CrtLightSeen light = crt_is_shape_light(ctx, index)
+                                 ? crt_shape_light_pdf(ctx, index, path->p,
+                                                       crt_fma3(path->ray.d, t, path->ray.o), surface->ng)
+                                 : crt_light_pdf(ctx, index, path->p, distance);
         if (crt_has_light_tree(ctx))
-            light.pdf = light.pdf * crt_light_tree_probability(ctx, surface->light, path->p, path->side);
+            light.pdf = light.pdf * crt_light_tree_probability(ctx, index, path->p, path->side);
         if (light.pdf > 0.0f) {
             /* The ray starts a clearance off p, from which lights are sampled. Close to a light the
                directions from the two differ: both techniques estimate what arrives at p, and are weighed

@@ -91,6 +91,7 @@ CRT_FN u32 crt_vertex_media(const CrtContext *ctx, const CrtVertex *vertex, vec3
 CRT_FN f32 crt_shading_cosine(const CrtBsdf *b, vec3 w) {
     if ((b->flags & CRT_BSDF_RAISES) == 0u && !crt_is_facet(b)) return crt_abs(dot3(w, b->ns));
     f32 sum = 0.0f;
+    if (crt_is_translucent(b) && dot3(w, b->ng) < 0.0f) w = -w; /* the same law on both sides */
     const u32 ways = CRT_HAS(NORMAL_MAP) ? crt_ways(b, w) : 1u;
     CRT_ROLLED for (u32 way = 0u; way < ways; ++way)
         sum = sum + crt_lambert_pdf(b, way == 0u ? w : crt_mirrored(w, b->base));
@@ -102,7 +103,7 @@ CRT_FN vec4 crt_adjoint(const CrtVertex *vertex, vec3 wi) {
     const CrtBsdf *b = &vertex->bsdf;
     const vec3 ng = crt_vertex_side(vertex);
     vec4 factor = splat4(1.0f);
-    if ((CRT_HAS(DIELECTRIC) || CRT_HAS(ROUGH_DIELECTRIC)) && (b->flags & CRT_BSDF_TRANSMITS) != 0u &&
+    if ((CRT_HAS(DIELECTRIC) || CRT_HAS(ROUGH_DIELECTRIC)) && (b->flags & CRT_BSDF_BOUNDS) != 0u &&
         dot3(wi, ng) < 0.0f)
         factor = b->eta * b->eta;
     if (!(CRT_HAS(SMOOTH_NORMALS) || CRT_HAS(NORMAL_MAP))) return factor;

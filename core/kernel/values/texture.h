@@ -139,12 +139,22 @@ CRT_FN CrtValue crt_resolve_pattern(const CrtContext *ctx, CrtValue value, const
     return value;
 }
 
+/* The factor of an image. */
+CRT_FN vec4 crt_factor(const CrtContext *ctx, CrtValue factor, const CrtFacePlace *at, vec4 position) {
+    if (crt_is_texture(factor)) return crt_vertex_color(ctx, at, position);
+    if (CRT_HAS(TABLE) && (factor & CRT_VALUE_REFERENCE) != 0u)
+        return crt_spectrum(ctx, factor & CRT_VALUE_INDEX, position);
+    return splat4(crt_from_bits(factor));
+}
+
 /* Neither number, nor table, nor pattern. Called from wherever a material has a value; everything by value,
    so that none of it has to lie in memory. */
 CRT_CALLED_FN vec4 crt_texture(CrtContext ctx, u32 index, CrtFacePlace at, vec4 position) {
     const CrtTexture texture = CRT_ARRAY(CrtTexture, ctx.blob, ctx.scene->textures)[index];
     if (texture.kind == CRT_TEXTURE_VERTICES) return crt_vertex_color(&ctx, &at, position);
-    return crt_image(&ctx, &texture, &at, position);
+    const vec4 texel = crt_image(&ctx, &texture, &at, position);
+    if (!CRT_HAS(FACTOR) || texture.first == 0u) return texel;
+    return texel * crt_factor(&ctx, texture.first, &at, position);
 }
 
 CRT_KERNEL_END

@@ -9,13 +9,23 @@ namespace {
 using Value = nlohmann::json;
 
 /// Extensions whose absence would be seen, and which crt has.
-const std::set<std::string, std::less<>> kKnownExtensions{
-    "KHR_lights_punctual",      "KHR_materials_clearcoat",    "KHR_materials_emissive_strength",
-    "KHR_materials_ior",        "KHR_materials_iridescence",  "KHR_materials_sheen",
-    "KHR_materials_specular",   "KHR_materials_transmission", "KHR_materials_unlit",
-    "KHR_materials_volume",     "KHR_mesh_quantization",      "KHR_texture_transform",
-    "KHR_materials_anisotropy", "KHR_materials_dispersion",   "KHR_materials_variants",
-    "KHR_materials_pbrSpecularGlossiness"};
+const std::set<std::string, std::less<>> kKnownExtensions{"KHR_lights_punctual",
+                                                          "KHR_materials_clearcoat",
+                                                          "KHR_materials_emissive_strength",
+                                                          "KHR_materials_ior",
+                                                          "KHR_materials_iridescence",
+                                                          "KHR_materials_sheen",
+                                                          "KHR_materials_specular",
+                                                          "KHR_materials_transmission",
+                                                          "KHR_materials_unlit",
+                                                          "KHR_materials_volume",
+                                                          "KHR_mesh_quantization",
+                                                          "KHR_texture_transform",
+                                                          "KHR_materials_anisotropy",
+                                                          "KHR_materials_dispersion",
+                                                          "KHR_materials_variants",
+                                                          "KHR_materials_diffuse_transmission",
+                                                          "KHR_materials_pbrSpecularGlossiness"};
 
 }  // namespace
 

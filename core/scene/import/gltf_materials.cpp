@@ -82,6 +82,7 @@ struct GltfMaterials::Surface {
     Keys layers;              ///< Keys of coat and fuzz.
     std::string clear;  ///< Share of the dielectric that is glass; empty: none.
     bool all_clear = false, absorbs = false;
+    bool sheet = false;  ///< Some of it lets light through diffusely.
     std::string pane;  ///< Share of the surface that is a pane; empty: none.
     std::string pane_ior, pane_tint;
 
@@ -139,10 +140,10 @@ void GltfMaterials::readColor(Source& source, Surface& surface) {
                                                 source.pointer + "/pbrMetallicRoughness/baseColorTexture"),
                                 "the texture of the base colour");
     if (texture) {
-        const bool plain = surface.color_factor == kWhite;
-        surface.color = textures_.form(*texture, plain ? "" : ", factor: " + yamlList(surface.color_factor));
-        if (source.use.colors)
-            losses_.add("colours of vertices together with a texture: crt does not multiply them");
+        std::string more =
+            surface.color_factor == kWhite ? "" : ", factor: " + yamlList(surface.color_factor);
+        if (source.use.colors) more += ", vertex_colors: true";
+        surface.color = textures_.form(*texture, more);
     } else if (source.use.colors) {
         surface.color = "{attribute: colors}";
         source.text.color_factor = surface.color_factor;
@@ -321,6 +322,7 @@ void GltfMaterials::readCoat(Source& source, Surface& surface) {
     const double factor = unitOf(gltfNumber(coat, "clearcoatFactor", 0));
     if (factor == 0) return;
     if (!surface.clear.empty()) return losses_.add("a clear coat on glass");
+    if (surface.sheet) return losses_.add("a clear coat on what transmits diffusely");
     const std::string share = weight(source, textures_.named(coat, "clearcoatTexture", source.pointer),
                                      factor, "red", "the texture of the clear coat");
     if (share.empty()) return;
@@ -356,8 +358,36 @@ void GltfMaterials::readFuzz(Source& source, Surface& surface) {
                                 yamlNumber(unitOf(gltfNumber(sheen, "sheenRoughnessFactor", 0))));
 }
 
-/// Light of the object: the sum of what a texture of light would vary is no single radiance, so that is
-/// lost.
+/// A sheet that lets light through diffusely, below the gloss.
+void GltfMaterials::readSheet(Source& source, Surface& surface) {
+    const Value& sheet = gltfExtension(source.material, "KHR_materials_diffuse_transmission");
+    const double factor = unitOf(gltfNumber(sheet, "diffuseTransmissionFactor", 0));
+    if (factor == 0) return;
+    if (!surface.clear.empty()) return losses_.add("diffuse transmission of glass");
+    std::string share = yamlNumber(factor);
+    if (const auto texture =
+            usable(source, textures_.named(sheet, "diffuseTransmissionTexture", source.pointer),
+                   "the texture of the diffuse transmission");
+        texture && textures_.hasHoles(*texture))
+        share = textures_.form(*texture,
+                               ", channel: alpha" + (factor == 1 ? "" : ", factor: " + yamlNumber(factor)));
+    const std::array<double, 3> color = bounded(gltfColor(sheet, "diffuseTransmissionColorFactor", kWhite));
+    const auto texture =
+        usable(source, textures_.named(sheet, "diffuseTransmissionColorTexture", source.pointer),
+               "the texture of the colour of diffuse transmission");
+    if (gltfNumber(gltfExtension(source.material, "KHR_materials_volume"), "thicknessFactor", 0) > 0)
+        losses_.add("the volume of what transmits diffusely: crt makes it a thin sheet");
+    surface.sheet = true;
+    surface.dielectric.emplace_back("geometry_thin_walled", "true");
+    surface.dielectric.emplace_back("subsurface_weight", share);
+    surface.dielectric.emplace_back(
+        "subsurface_color",
+        texture ? textures_.form(*texture, color == kWhite ? "" : ", factor: " + yamlList(color))
+                : colorText(color));
+    surface.dielectric.emplace_back("subsurface_scatter_anisotropy", "1");
+}
+
+/// Light of the object: of one colour, or an image.
 void GltfMaterials::readEmission(Source& source) {
     std::array<double, 3> color{0, 0, 0};
     for (std::size_t k = 0; k < 3 && k < source.material.emissiveFactor.size(); ++k)
@@ -369,6 +399,7 @@ void GltfMaterials::readEmission(Source& source) {
         gltfNumber(gltfExtension(source.material, "KHR_materials_emissive_strength"), "emissiveStrength", 1),
         0.0, 1e15);
     const tinygltf::TextureInfo& info = source.material.emissiveTexture;
+    std::string image;
     if (info.index >= 0) {
         const auto texture = usable(source,
                                     textures_.named(info.index, info.texCoord, transformOf(info.extensions),
@@ -376,31 +407,35 @@ void GltfMaterials::readEmission(Source& source) {
                                     "the texture of the emitted light");
         if (!texture) return;
         const TexelStatistics& texels = textures_.statistics(*texture);
-        if (!texels.isConstant())
-            return losses_.add("emissive texture: crt only supports uniform emission");
-        for (std::size_t k = 0; k < 3; ++k) color[k] *= texels.linear_mean[k];
+        if (texels.most == std::array<double, 3>{0, 0, 0}) return;
+        if (texels.isConstant())
+            for (std::size_t k = 0; k < 3; ++k) color[k] *= texels.linear_mean[k];
+        else
+            image = ", color: " + textures_.form(*texture);
     }
     const double most = gltfLargest(color);
     if (!(most * strength > 0)) return;
     for (double& c : color) c /= most;
-    source.text.emission = fmt::format("{{radiance: {}{}}}", lightText(color, most * strength * nit_),
-                                       source.material.doubleSided ? ", two_sided: true" : "");
+    source.text.emission = fmt::format("{{radiance: {}{}{}}}", lightText(color, most * strength * nit_),
+                                       image, source.material.doubleSided ? ", two_sided: true" : "");
 }
 
 /// A surface that is seen in its colour whatever the light: it emits that, and reflects nothing.
 bool GltfMaterials::readUnlit(Source& source) {
     if (!hasExtension(source.material, "KHR_materials_unlit")) return false;
-    if (source.use.colors || source.material.pbrMetallicRoughness.baseColorTexture.index >= 0) {
-        losses_.add("an unlit material with a texture or colours of vertices: crt makes it diffuse, and "
-                    "lights it");
+    if (source.use.colors) {
+        losses_.add("an unlit material with colours of vertices: crt makes it diffuse, and lights it");
         return false;
     }
     Surface surface;
     readColor(source, surface);
+    readOpacity(source, surface);
+    const bool image = surface.color.starts_with("{texture");
     if (gltfLargest(surface.color_factor) > 0)
-        source.text.emission =
-            fmt::format("{{radiance: {}, two_sided: true}}", lightText(surface.color_factor, nit_));
-    add(source.text.name, {{"type", "diffuse"}, {"reflectance", "0"}});
+        source.text.emission = fmt::format("{{radiance: {}{}, two_sided: true}}",
+                                           lightText(image ? kWhite : surface.color_factor, nit_),
+                                           image ? ", color: " + surface.color : "");
+    add(source.text.name, {{"type", "diffuse"}, {"reflectance", "0"}, {"opacity", surface.opacity}});
     return true;
 }
 
@@ -491,6 +526,7 @@ void GltfMaterials::read(Source& source, Surface& surface) {
     readNormals(source, surface);
     readDielectric(source, surface);
     readClear(source, surface);
+    readSheet(source, surface);
     readCoat(source, surface);
     readFuzz(source, surface);
     readEmission(source);

@@ -63,6 +63,7 @@ private:
     void readNormals(Source& source, Surface& surface);
     void readDielectric(Source& source, Surface& surface);
     void readClear(Source& source, Surface& surface);
+    void readSheet(Source& source, Surface& surface);
     void readCoat(Source& source, Surface& surface);
     void readFuzz(Source& source, Surface& surface);
     void readEmission(Source& source);

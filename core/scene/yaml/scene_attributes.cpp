@@ -35,6 +35,7 @@ Needs needsOf(const Scene& scene, TextureIndex index) {
          : texture.of_opacity                        ? needs.opacity
                                                      : needs.uvs) = true;
         for (const TextureValue& value : texture.values) waiting.insert(value.texture);
+        if (texture.factor) waiting.insert(texture.factor->texture);
     }
     return needs;
 }
@@ -93,9 +94,28 @@ void MeshReader::readAttributes(const SectionReader& section, Mesh& mesh) const 
         section.error("color_space", "it needs 'colors'");
 }
 
+/// An image that emits needs a place on the mesh.
+void MeshReader::checkEmission(const SectionReader& section, const Object& object, const Mesh& mesh) const {
+    std::set<std::int32_t> emissions(mesh.emission.begin(), mesh.emission.end());
+    emissions.insert(object.emission);
+    emissions.erase(-1);
+    for (const std::int32_t index : emissions) {
+        if (scene_.emissions[static_cast<std::size_t>(index)].texture == kNoTexture) continue;
+        if (object.shape)
+            section.error("emission", "only a mesh can emit an image, not a sphere, disk or cylinder");
+        else if (mesh.uvs.empty() || mesh.uvs_are_opacity)
+            section.error("emission",
+                          fmt::format("the emission is an image, but the mesh of {} has no texture "
+                                      "coordinates",
+                                      section.subject()),
+                          section.has("mesh") ? "give the mesh 'uvs', one [u, v] for each position" : "");
+    }
+}
+
 void MeshReader::checkTextures(const SectionReader& section, const Object& object) const {
     if (scene_.textures.empty()) return;
     const Mesh& mesh = scene_.meshes[object.mesh];  // Of a shape it is empty.
+    checkEmission(section, object, mesh);
     std::set<std::int32_t> materials(mesh.material.begin(), mesh.material.end());
     if (mesh.material.empty() || materials.contains(-1)) materials.insert(object.material);
     materials.erase(-1);

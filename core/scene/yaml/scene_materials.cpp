@@ -1,5 +1,6 @@
 #include "scene/yaml/scene_materials.h"
 
+#include "base/log.h"
 #include "scene/light_units.h"
 #include "scene/scene_limits.h"
 
@@ -56,6 +57,7 @@ void MaterialReader::readMaterial(const YamlEntry& entry) {
         if (kind == word) material.type = type;
     for (const auto& [type, word] : kComposedNames)
         if (kind == word) material.type = type;
+    if (kind == "translucent") material.type = MaterialType::Plastic;  // without a coat
     const bool open_pbr = kind == "openpbr";
     takeNumber(open_pbr ? "geometry_opacity" : "opacity", material.opacity, material.opacity_texture);
     if (section->schema().find("normal_map") != nullptr)
@@ -79,6 +81,7 @@ void MaterialReader::readMaterial(const YamlEntry& entry) {
         takeNumber("roughness", material.roughness, material.roughness_texture);
     takeColor("reflectance", material.reflectance, material.reflectance_texture);
     takeColor("tint", material.tint, material.tint_texture);
+    takeColor("transmittance", material.transmittance, material.transmittance_texture);
     for (const auto& [key, member] : kMaterialNumbers)
         if (section->schema().find(key) != nullptr) section->read(key, material.*member);
     switch (material.type) {
@@ -102,9 +105,10 @@ void MaterialReader::readMaterial(const YamlEntry& entry) {
             [[fallthrough]];
         case MaterialType::TwoSided: readParts(*section); break;
         case MaterialType::Plastic: {
-            double ior = 1.5;
-            section->read("ior", ior);
+            double ior = kind == "translucent" ? 1 : 1.5;
+            if (kind == "plastic") section->read("ior", ior);
             material.eta = constantSpectrum(ior);
+            checkSheet(*section, material);
             break;
         }
         default: break;  // the keys above are all that it has
@@ -122,6 +126,31 @@ void MaterialReader::makeRoughDiffuse(Material& material) {
     if (!(material.diffuse_roughness > 0)) return;
     material.type = MaterialType::Plastic;
     material.eta = constantSpectrum(1);
+}
+
+/// Spectra of colours may add up to slightly more than 1 at single wavelengths.
+void MaterialReader::checkSheet(const SectionReader& section, Material& material) const {
+    if (material.transmittance_texture != kNoTexture || !material.transmittance) return;
+    if (!(material.transmittance->max() > 0)) return material.transmittance.reset();
+    if (material.reflectance_texture != kNoTexture) return;
+    double least = 2, most = 0;
+    for (std::size_t i = 0; i < kSpectrumSize; ++i) {
+        const double sum = material.reflectance[i] + (*material.transmittance)[i];
+        least = std::min(least, sum);
+        most = std::max(most, sum);
+    }
+    constexpr double kRounding = 1e-9, kVisible = 1e-3;
+    if (least > 1 + kRounding)
+        section.error("transmittance",
+                      fmt::format("the sheet would send on more light than it receives: 'reflectance' and "
+                                  "'transmittance' are together {:.4g} or more",
+                                  least),
+                      "give two that are together at most 1");
+    else if (most > 1 + kVisible)
+        logWarning(
+            "{}: 'reflectance' and 'transmittance' are together up to {:.4g} at some wavelengths; "
+            "crt lets less light through there",
+            section.place("transmittance").resolved().text(), most);
 }
 
 void MaterialReader::readThinFilm(const SectionReader& section, Material& material) {
@@ -213,6 +242,30 @@ void MaterialReader::readBrightness(const SectionReader& light, const std::funct
     }
 }
 
+/// The factor on the radiance: of the whole surface, or by place.
+void MaterialReader::readEmittedColor(const SectionReader& light, Emission& emission) {
+    for (const char* key : {"luminous_flux_lm", "power_w"})
+        if (light.has(key) && light.has("color"))
+            light.error(key, "the flux of a surface with 'color' is not known when it is read",
+                        "give 'luminance_cd_m2' or 'radiance', of white; or its 'spectrum' instead of "
+                        "'color'");
+    if (!TextureReader::isTexture(light, "color")) {
+        const std::optional<Spectrum> color = spectra_.read(light, "color", SpectrumUse::Reflectance);
+        if (color)
+            for (std::size_t i = 0; i < kSpectrumSize; ++i) emission.radiance[i] *= (*color)[i];
+        return;
+    }
+    const std::optional<TextureIndex> index = textures_.read(light, "color", TexelKind::Spectra);
+    if (!index) return;
+    Texture texture = scene_.textures[static_cast<std::size_t>(*index)];
+    if (texture.kind != Texture::Kind::Image || texture.factor)
+        return light.error("color", "what emits is an image without 'vertex_colors', or one colour",
+                           "write {texture: FILE}");
+    texture.factor = TextureValue{emission.radiance, kNoTexture};
+    emission.texture = static_cast<TextureIndex>(scene_.textures.size());
+    scene_.textures.push_back(std::move(texture));
+}
+
 std::optional<std::int32_t> MaterialReader::readEmission(const SectionReader& section, std::int32_t material,
                                                          const std::string& material_name,
                                                          const std::function<double()>& area_m2) {
@@ -222,6 +275,7 @@ std::optional<std::int32_t> MaterialReader::readEmission(const SectionReader& se
     Emission emission;
     light->read("two_sided", emission.two_sided);
     readBrightness(*light, area_m2, emission);
+    readEmittedColor(*light, emission);
     if (material >= 0 && scene_.materials[static_cast<std::size_t>(material)].emission >= 0)
         section.error("emission", fmt::format("material '{}' emits light already", material_name),
                       "leave 'emission' or the material's 'emission_luminance' out");

@@ -47,7 +47,10 @@ private:
     static void makeRoughDiffuse(Material& material);
     void readBrightness(const SectionReader& light, const std::function<double()>& area_m2,
                         Emission& emission);
+    void readEmittedColor(const SectionReader& light, Emission& emission);
     void readAnisotropy(const SectionReader& section, Material& material) const;
+    /// Refuses a thin sheet that would make light.
+    void checkSheet(const SectionReader& section, Material& material) const;
     struct OpenPbr;
     /// Makes the material of what OpenPBR's keys say, and of further ones, which come before it.
     void readOpenPbr(const SectionReader& section, Material& material);

@@ -49,6 +49,7 @@ public:
                                       Object& into);
     /// Refuses a mesh that lacks what its materials need.
     void checkTextures(const SectionReader& section, const Object& object) const;
+    void checkEmission(const SectionReader& section, const Object& object, const Mesh& mesh) const;
     /// Warns of triangles that were left out.
     void finish() const;
 

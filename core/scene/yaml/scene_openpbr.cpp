@@ -62,6 +62,11 @@ struct MaterialReader::OpenPbr {
     Spectrum transmission_color = constantSpectrum(1);
     double transmission_depth = 0, dispersion_scale = 0, abbe = 20;
     double film_weight = 0, film_um = 0.5, film_ior = 1.4;
+    Weight subsurface{};
+    Spectrum subsurface_color = constantSpectrum(0.8);
+    TextureIndex subsurface_texture = kNoTexture;
+    double subsurface_forward = 0;  ///< Share of it that comes out on the other side.
+    bool thin_walled = false;
     Weight coat{};
     Spectrum coat_color = constantSpectrum(1);
     Weight coat_roughness{};
@@ -98,6 +103,8 @@ private:
     void setCoat(Material& part, double share) const;
     Material metal(bool coated) const;
     Material glossy(bool coated) const;
+    Material sheet(bool coated) const;
+    void setGloss(Material& part, bool coated) const;
     Material clear(bool under_film) const;
     Material base(bool coated) const;
     Material mixed(const char* what, Material first, Material second, const Weight& amount) const;
@@ -147,6 +154,12 @@ void MaterialReader::OpenPbr::read() {
     if (std::optional<Spectrum> s =
             reader.spectra_.read(section, "emission_color", SpectrumUse::Emission))
         emission_color = *std::move(s);
+    number("subsurface_weight", subsurface);
+    color("subsurface_color", subsurface_color, subsurface_texture);
+    double anisotropy = 0;
+    section.read("subsurface_scatter_anisotropy", anisotropy);
+    subsurface_forward = (1 + anisotropy) / 2;
+    section.read("geometry_thin_walled", thin_walled);
     number("coat_weight", coat);
     color("coat_color", coat_color);
     number("coat_roughness", coat_roughness);
@@ -184,19 +197,18 @@ void MaterialReader::OpenPbr::refuse() const {
     const auto no = [&](bool seen, const char* key, const char* why, const char* instead) {
         if (seen) section.error(key, why, instead);
     };
-    double subsurface = 0;
-    if (section.read("subsurface_weight", subsurface))
-        no(subsurface > 0, "subsurface_weight", "crt does not support subsurface scattering, where light "
-                                                "wanders below a surface",
-           "remove 'subsurface_weight', which makes the base diffuse");
+    no(subsurface.mayBeAbove0() && !thin_walled, "subsurface_weight",
+       "crt does not support subsurface scattering in bodies, where light wanders below a surface",
+       "remove 'subsurface_weight', which makes the base diffuse; or write 'geometry_thin_walled: true' for "
+       "a leaf or paper");
+    no(subsurface.mayBeAbove0() && coat.mayBeAbove0(), "coat_weight",
+       "crt does not support a coat on what lets light through", "leave 'coat_weight' out");
+    no(thin_walled && isClear() && roughness.mayBeAbove0(), "specular_roughness",
+       "a clear material that is thin-walled must be smooth", "give 'specular_roughness' 0");
     no(emission_luminance > 0 && like.fuzz > 0, "emission_luminance",
        "the fuzz would take some of the emitted light, and crt supports emission only from the top layer",
        "leave 'fuzz_weight' or 'emission_luminance' out");
     refuseCoat(no);
-    bool thin_walled = false;
-    if (section.read("geometry_thin_walled", thin_walled))
-        no(thin_walled, "geometry_thin_walled", "crt does not support thin-walled openpbr materials",
-           "use a thin_dielectric");
     const auto indices = [&](auto&& are) {
         return (coat.mayBeBelow1() && are(index())) || (coat.mayBeAbove0() && are(index(true)));
     };
@@ -221,11 +233,11 @@ void MaterialReader::OpenPbr::refuse() const {
        "give 'specular_ior' of at least 1, and a smaller 'specular_weight'");
     no(isClear() && !(index() <= 1e3 && index() >= 1e-3), "specular_weight",
        "this changes the index to beyond 0.001 to 1000", "give a smaller 'specular_weight'");
-    no(isClear() && !isWhite(transmission_color) && transmission_depth == 0, "transmission_color",
-       "a depth of 0 would tint the surface itself instead of the inside",
+    no(isClear() && !thin_walled && !isWhite(transmission_color) && transmission_depth == 0,
+       "transmission_color", "a depth of 0 would tint the surface itself instead of the inside",
        "give 'transmission_depth', the distance after which light has this colour");
-    no(isClear() && transmission_depth > 0 && !(transmission_color.min() > 0), "transmission_color",
-       "black is opaque at any depth", "give a colour above 0 at every wavelength");
+    no(isClear() && !thin_walled && transmission_depth > 0 && !(transmission_color.min() > 0),
+       "transmission_color", "black is opaque at any depth", "give a colour above 0 at every wavelength");
     no(isClear() && dispersion_scale > 0 && !(dispersed(index(), abbe / dispersion_scale).min() > 1e-3),
        "transmission_dispersion_abbe_number", "the index would fall below 0.001",
        "give a larger Abbe number");
@@ -241,7 +253,7 @@ void MaterialReader::OpenPbr::refuse() const {
     no(film && (isMetal() || coated), "thin_film_weight",
        "crt supports thin films on clear dielectrics, and on metals with a complex index",
        "give 'transmission_weight' 1, or use a rough_conductor with 'thin_film'");
-    const bool absorbs = isClear() && transmission_depth > 0 && !isWhite(transmission_color);
+    const bool absorbs = isClear() && !thin_walled && transmission_depth > 0 && !isWhite(transmission_color);
     no(absorbs && !like.isOpaque(), "geometry_opacity",
        "an absorbing body must be closed: light would enter it through holes",
        "leave 'geometry_opacity' or 'transmission_color' out");
@@ -296,21 +308,50 @@ Material MaterialReader::OpenPbr::glossy(bool coated) const {
     part.diffuse_roughness = diffuse_roughness;
     const double n = index(coated);
     if (coated) setCoat(part, reflectedStraightOn(n));
-    if (n == 1) {
+    if (n == 1)
         makeRoughDiffuse(part);
-        return part;
-    }
+    else
+        setGloss(part, coated);
+    return part;
+}
+
+void MaterialReader::OpenPbr::setGloss(Material& part, bool coated) const {
     part.type = MaterialType::Plastic;
     part.by_color = true;
-    part.eta = constantSpectrum(n);
+    part.eta = constantSpectrum(index(coated));
     part.tint_texture = specular_texture;
     if (!isWhite(specular_color)) part.tint = specular_color;
     setRoughness(part, coated);
-    return part;
+}
+
+/// The subsurface of a thin wall: diffuse reflection and transmission of one colour, below the gloss.
+Material MaterialReader::OpenPbr::sheet(bool coated) const {
+    const auto side = [&](double here, double there) {
+        Material part = like;
+        setGloss(part, coated);
+        part.reflectance = scaled(subsurface_color, here);
+        part.transmittance = scaled(subsurface_color, there);
+        if (here == 1) part.reflectance_texture = subsurface_texture;
+        if (there == 1) part.transmittance_texture = subsurface_texture;
+        if (there == 0) part.transmittance.reset();
+        return part;
+    };
+    if (subsurface_texture == kNoTexture) return side(1 - subsurface_forward, subsurface_forward);
+    return mixed("sheet", side(1, 0), side(0, 1), {subsurface_forward});
 }
 
 Material MaterialReader::OpenPbr::clear(bool under_film) const {
     Material part = like;
+    if (under_film) {
+        part.film_thickness_nm = 1000 * film_um;
+        part.film_index = constantSpectrum(film_ior);
+    }
+    if (thin_walled) {
+        part.type = MaterialType::ThinDielectric;
+        part.eta = constantSpectrum(index());
+        if (!isWhite(transmission_color)) part.tint = transmission_color;
+        return part;
+    }
     part.type = MaterialType::RoughDielectric;
     part.eta = dispersion_scale > 0 ? dispersed(index(), abbe / dispersion_scale)
                                     : constantSpectrum(index());
@@ -321,10 +362,6 @@ Material MaterialReader::OpenPbr::clear(bool under_film) const {
         for (std::size_t i = 0; i < kSpectrumSize; ++i)
             absorption[i] = -std::log(transmission_color[i]) / transmission_depth;
         part.absorption = transmission_color.isConstant() ? constantSpectrum(absorption[0]) : absorption;
-    }
-    if (under_film) {
-        part.film_thickness_nm = 1000 * film_um;
-        part.film_index = constantSpectrum(film_ior);
     }
     return part;
 }
@@ -350,6 +387,8 @@ Material MaterialReader::OpenPbr::mixed(const char* what, Material first, Materi
 
 Material MaterialReader::OpenPbr::base(bool coated) const {
     Material dielectric = glossy(coated);
+    if (subsurface.mayBeAbove0())
+        dielectric = mixed("subsurface", std::move(dielectric), sheet(coated), subsurface);
     if (isClear()) {
         const Weight film{film_um > 0 ? film_weight : 0};
         Material translucent = film.value > 0

@@ -658,6 +658,15 @@ void addDielectrics(std::vector<SectionSchema>& all) {
           thinFilmKey()}});
 }
 
+/// Of thin sheets.
+KeySchema transmittanceKey(const char* what) {
+    return {.name = "transmittance",
+            .kind = Kind::Spectrum,
+            .range = {.min = 0, .max = 1},
+            .section = "texture",
+            .doc = what};
+}
+
 void addMaterials(std::vector<SectionSchema>& all) {
     const KeySchema reflectance{.name = "reflectance",
                                 .kind = Kind::Spectrum,
@@ -681,6 +690,16 @@ void addMaterials(std::vector<SectionSchema>& all) {
                   "`base_diffuse_roughness` of OpenPBR Surface 1.1: like clay or the full moon, as bright "
                   "towards the light's edges as in the middle. No light is lost: 1 is white in a white "
                   "room; other colours get deeper, since light is reflected more than once."}}});
+    KeySchema transmittance = transmittanceKey(
+        "The fraction that it lets through, scattered to all sides. With the reflectance at most 1 at every "
+        "wavelength; where an image makes it more, the transmittance is less.");
+    transmittance.required = true;
+    all.push_back({"material/translucent",
+                   "a translucent material",
+                   "A thin sheet that scatters light to both of its sides by Lambert's law: paper, a "
+                   "curtain, a lampshade, a leaf. Seen from either side it is the same. `plastic` with a "
+                   "`transmittance` has a gloss besides.",
+                   {materialType("translucent"), reflectance, transmittance}});
     all.push_back({"material/mirror",
                    "a mirror material",
                    "Perfect reflection.",
@@ -731,6 +750,9 @@ void addMaterials(std::vector<SectionSchema>& all) {
           tintKey(
               "Factor on what the coat mirrors, at every wavelength. The coat absorbs the rest; the base "
               "keeps its colour."),
+          transmittanceKey(
+              "The fraction of light within that the base scatters to its other side. It is a thin sheet "
+              "then, with the coat on both sides: a leaf. With `reflectance` at most 1; by default 0."),
           {.name = "ior",
            .kind = Kind::Number,
            .range = {.min = 1, .max = 10},
@@ -1053,6 +1075,14 @@ void addObjects(std::vector<SectionSchema>& all) {
            .range = kRadiance,
            .fallback = "{illuminant: D65}",
            .doc = "The colour, where one of these amounts says how bright it is."},
+          {.name = "color",
+           .kind = Kind::Spectrum,
+           .range = {.min = 0, .max = 1},
+           .section = "texture",
+           .fallback = "1",
+           .doc = "Factor on the radiance, at every wavelength: a filter, or an image on a mesh, as on a "
+                  "screen. Bright parts of an image are found as lamps are. `radiance` or "
+                  "`luminance_cd_m2` is then that of white texels, and a flux cannot be given."},
           {.name = "two_sided",
            .kind = Kind::Boolean,
            .fallback = yaml(Emission{}.two_sided),

@@ -65,10 +65,6 @@ KeySchema amount(std::string name, ValueRange range, std::string fallback, std::
             .doc = std::move(doc)};
 }
 
-KeySchema refused(std::string name, const char* what) {
-    return amount(std::move(name), kNotNegative, "0", std::string("Above 0 it is refused: ") + what);
-}
-
 }  // namespace
 
 void addOpenPbr(std::vector<SectionSchema>& all) {
@@ -86,8 +82,8 @@ void addOpenPbr(std::vector<SectionSchema>& all) {
         "where a dark tint would make it negative. A glossy base is a `plastic` in the reciprocal form of "
         "the specification, which gives `base_color` to what comes out of the gloss; a clear one is a "
         "`rough_dielectric`, its `specular_weight` an index. Rough surfaces compensate the energy loss of "
-        "microfacets, as elsewhere in crt. Subsurface and thin walls are refused where they would be "
-        "visible, and so are features that crt's own material lacks; the message says what to write "
+        "microfacets, as elsewhere in crt. Subsurface in bodies is refused where it would be visible, and "
+        "so are features that crt's own material lacks; the message says what to write "
         "instead. Other keys of the specification are unknown.",
         {typeKey("openpbr", "material"),
          weight("base_weight", "1", "Factor on `base_color`."),
@@ -123,7 +119,14 @@ void addOpenPbr(std::vector<SectionSchema>& all) {
          weight("thin_film_weight", "0", "Share of the surface that has a film."),
          amount("thin_film_thickness", {.min = 0, .max = 20}, "0.5", "Thickness of the film.", "µm"),
          amount("thin_film_ior", {.min = 0.1, .max = 10}, "1.4", "Its index relative to the outside."),
-         refused("subsurface_weight", "crt has no subsurface scattering."),
+         weight("subsurface_weight", "0",
+                "Share of the base that lets light through. Above 0 it is refused without "
+                "`geometry_thin_walled`: crt has no subsurface scattering in bodies. In a thin wall it is "
+                "diffuse reflection and transmission, below the gloss of both sides.",
+                true),
+         color("subsurface_color", "0.8", "Their colour, reflection and transmission together.", true),
+         amount("subsurface_scatter_anisotropy", {.min = -1, .max = 1}, "0",
+                "g: the share (1 + g) / 2 is transmitted, the rest reflected."),
          weight("coat_weight", "0",
                 "Share of the surface that a coat lies on: a clear or tinted dielectric, like lacquer. Its "
                 "reflection is white; the layers below get the rest. A dielectric base has the index "
@@ -167,7 +170,8 @@ void addOpenPbr(std::vector<SectionSchema>& all) {
          {.name = "geometry_thin_walled",
           .kind = Kind::Boolean,
           .fallback = "false",
-          .doc = "`true` is refused: `thin_dielectric` is a pane."}}};
+          .doc = "The surface is a thin sheet instead of a body's: what is clear is a `thin_dielectric`, "
+                 "smooth and in the tint of `transmission_color`; subsurface is as in `translucent`."}}};
     section.keys.push_back(*diffuse->find("normal_map"));
     all.insert(place, std::move(section));
 }

@@ -109,6 +109,10 @@ void addTextures(std::vector<SectionSchema>& all) {
            .fallback = "1",
            .doc = "Factor on the texels: of colours on linear red, green and blue, one for all or "
                   "[r, g, b]."},
+          {.name = "vertex_colors",
+           .kind = Kind::Boolean,
+           .fallback = "false",
+           .doc = "True: colours are multiplied by those of the mesh's vertices, which it must have."},
           {.name = "cutoff",
            .kind = Kind::Number,
            .range = {0, 1, false, false},

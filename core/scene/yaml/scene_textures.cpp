@@ -163,6 +163,15 @@ std::optional<Texture> TextureReader::readImage(const SectionReader& form, Texel
         form.error("channel", "the texels are colours here; 'channel' picks one for a number");
     }
     readFactor(form, use);
+    bool vertex_colors = false;
+    if (form.read("vertex_colors", vertex_colors) && kind == TexelKind::Numbers)
+        form.error("vertex_colors", "the texels are numbers here; colours of vertices multiply colours");
+    if (vertex_colors) {
+        Texture colors;
+        colors.kind = Texture::Kind::VertexColors;
+        colors.place = form.place("vertex_colors").resolved();
+        texture.factor = TextureValue{{}, add(std::move(colors))};
+    }
     texture.image = openImage(form, use);
     if (!texture.image) return std::nullopt;
     return texture;

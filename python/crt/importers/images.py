@@ -26,6 +26,17 @@ def pixels(path, raw=False):
     return made.astype(np.float32)
 
 
+def emitted(image):
+    """Pixels of light as the keys of an emission: the radiance of the brightest number, in D65, and the
+    image as a share of it. None where all are black."""
+    most = float(np.max(image, initial=0))
+    if not most > 0:
+        return None
+    shares = np.clip(image / most, 0, 1).astype(np.float32)
+    return {"radiance": {"rgb": [1.0, 1.0, 1.0], "space": "linear", "scale": most},
+            "color": {"texture": shares, "color_space": "linear"}}
+
+
 def powered(made, power):
     """A texture of numbers with its values, held within [0, 1], to a power; None where crt cannot read its
     image."""

@@ -331,9 +331,11 @@ class Importer:
         material = None if passes else self.materials.name(
             plugin.one("bsdf"), flip_v=flip_v, has_uvs=self.shapes.has_uvs,
             has_colors=self.shapes.has_colors)
-        textured = material and has_texture(self.scene.materials[material], self.scene.materials)
-        geometry = geometry(stretches(places), textured)
-        emission = self.emission(plugin, in_group)
+        emission = self.emission(plugin, in_group, flip_v)
+        # In crt only meshes emit images.
+        image = emission is not None and "color" in emission
+        textured = image or (material and has_texture(self.scene.materials[material], self.scene.materials))
+        geometry = geometry(stretches(places) or image, textured)
         if plugin.all("medium"):
             self.medium(plugin.place)
         for name in ("silhouette_sampling_weight", "optimize"):
@@ -346,7 +348,7 @@ class Importer:
             self.losses.add(plugin.place, "a light of bsdf 'null'", "a black light")
         self.scene.add(plugin.place, Thing(plugin.id or plugin.kind, geometry, places, material, emission))
 
-    def emission(self, plugin, in_group):
+    def emission(self, plugin, in_group, flip_v):
         emitter = plugin.one("emitter")
         if emitter is None:
             return None
@@ -358,7 +360,8 @@ class Importer:
             return None
         if emitter.kind == "directionalarea":
             self.losses.add(emitter.place, f"{emitter}", "emitter 'area'")
-        made = {"radiance": self.values.emission(emitter, "radiance")}
+        values = Values(self.reader, self.losses, flip_v=flip_v, has_uvs=self.shapes.has_uvs)
+        made = values.surface_light(emitter)
         emitter.get("sampling_weight")
         self.unused(emitter)
         return made

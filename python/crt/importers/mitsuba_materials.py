@@ -365,15 +365,20 @@ class Materials:
         return Surface(made, clear=clear)
 
     def of_principledthin(self, plugin, values):
-        self.losses.add(plugin.place, "bsdf 'principledthin'", "bsdf 'principled' without transmission",
-                        large=True)
-        passing = ("spec_trans", "diff_trans")
-        for name in passing:
-            plugin.values.pop(name, None)
-            plugin.left.discard(name)
-        plugin.parts = [(name, part) for name, part in plugin.parts if name not in passing]
         made = self.of_principled(plugin, values)
-        return dataclasses.replace(made, both=True)
+        content = made.content | {"geometry_thin_walled": True}
+        passed = values.number(plugin, "diff_trans", 0.0) if plugin.has("diff_trans") else 0
+        if isinstance(passed, dict):
+            self.losses.add(plugin.place, "a texture of 'diff_trans'", "half of the light on each side")
+            passed = 1
+        if passed > 0:
+            content |= {"subsurface_weight": 1, "subsurface_color": content["base_color"],
+                        "subsurface_scatter_anisotropy": min(passed, 2) - 1}
+        if content.get("transmission_weight", 0) != 0 and content["specular_roughness"] != 0:
+            self.losses.add(plugin.place, "the roughness of bsdf 'principledthin' with 'spec_trans'",
+                            "a smooth pane")
+            content["specular_roughness"] = 0
+        return Surface(content, clear=True, both=True)
 
 
 def rough_mirror(color, widths):

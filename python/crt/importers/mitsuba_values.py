@@ -6,7 +6,7 @@ import pathlib
 import numpy as np
 
 from . import spectra
-from .images import BYTES, IMAGES, pixels
+from .images import BYTES, IMAGES, emitted, pixels
 from .losses import present, refuse, step
 
 FLIP_V = np.array([[1.0, 0, 0], [0, -1, 1], [0, 0, 1]])
@@ -158,18 +158,34 @@ class Values:
         plugin.unused(self.losses, {"accel", "format", "raw"})
         return found
 
+    def surface_light(self, plugin):
+        """The keys of an emission for a light of a surface."""
+        part = plugin.part("radiance")
+        if part is None or part.kind != "bitmap":
+            return {"radiance": self.emission(plugin, "radiance")}
+        found = self.pixels_of_light(part)
+        image = None if found is None else emitted(found)
+        if not self.has_uvs or image is None:
+            return {"radiance": self.mean_light(part, found)}
+        return {"radiance": image["radiance"], "color": image["color"] | self.sampled(part)}
+
+    def pixels_of_light(self, plugin):
+        path, _ = self.image(plugin)
+        found = None if path is None else pixels(path, plugin.get("raw", False))
+        if path is not None and found is None:
+            self.losses.add(plugin.place, f"a texture of type '{path.suffix}' that emits light",
+                            "white of radiance 1", large=True)
+        return found
+
+    def mean_light(self, plugin, found):
+        if found is None:
+            return spectra.d65(1)
+        self.losses.add(plugin.place, "a texture that emits light", "its mean colour", large=True)
+        return spectra.rgb(found.mean((0, 1)).tolist())
+
     def emitted(self, plugin):
         if plugin.kind == "bitmap":
-            path, _ = self.image(plugin)
-            if path is None:
-                return spectra.d65(1)
-            found = pixels(path)
-            if found is None:
-                self.losses.add(plugin.place, f"a texture of type '{path.suffix}' that emits light",
-                                "white of radiance 1", large=True)
-                return spectra.d65(1)
-            self.losses.add(plugin.place, "a texture that emits light", "its mean colour", large=True)
-            return spectra.rgb(found.mean((0, 1)).tolist())
+            return self.mean_light(plugin, self.pixels_of_light(plugin))
         if plugin.kind == "d65":
             scale = plugin.number("scale", 1)
             color = plugin.get("color")
@@ -259,7 +275,6 @@ class Values:
     def of_bitmap(self, plugin, numbers):
         path, readable = self.image(plugin)
         raw = plugin.get("raw", False)
-        wrap, filtering = plugin.text("wrap_mode", "repeat"), plugin.text("filter_type", "bilinear")
         if not readable:
             if path:
                 self.losses.add(plugin.place, f"images of type '{path.suffix}'", "0.5")
@@ -269,8 +284,12 @@ class Values:
             made["color_space"] = "raw" if numbers else "linear"
         elif numbers and path.suffix.lower() in BYTES:
             made = decoded(self.losses, plugin.place, path)
-        if wrap in ("mirror", "clamp"):
-            made["wrap"] = wrap
+        return made | self.sampled(plugin)
+
+    def sampled(self, plugin):
+        """The keys of a bitmap's look-up."""
+        wrap, filtering = plugin.text("wrap_mode", "repeat"), plugin.text("filter_type", "bilinear")
+        made = {"wrap": wrap} if wrap in ("mirror", "clamp") else {}
         if filtering == "nearest":
             made["filter"] = "nearest"
         return made | self.placed(plugin, FLIP_V @ flat(plugin.transform("to_uv")) @ self.uv)

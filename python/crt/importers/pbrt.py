@@ -7,7 +7,7 @@ import numpy as np
 from ..errors import Error, Kind
 from . import matrices, pbrt_shapes, sky_image, spectra
 from .draft import BLACK, Draft, Thing, half_tangent, has_texture, stretches
-from .images import pixels
+from .images import emitted, pixels
 from .losses import present, refuse, suggestion
 from .pbrt_materials import Materials
 from .pbrt_state import State
@@ -277,8 +277,9 @@ class Importer:
         places = [placement @ graphics.matrix for placement in placements]
         content = self.scene.materials[material]
         sided = emitter is not None or content["type"] in SIDED
-        geometry = self.shapes.geometry(found, graphics.reverse, stretches(places), sided=sided,
-                                        textured=has_texture(content, self.scene.materials))
+        image = emitter is not None and emitter.has("filename")  # In crt only meshes emit images.
+        geometry = self.shapes.geometry(found, graphics.reverse, stretches(places) or image, sided=sided,
+                                        textured=image or has_texture(content, self.scene.materials))
         if geometry is None:
             return
         emission = None if emitter is None else self.area(emitter, found, geometry, places[0])
@@ -292,17 +293,20 @@ class Importer:
         scale_of = 1.0
         if emitter.number("power", -1) > 0:
             scale_of = math.pi * (2 if two_sided else 1) * self.shapes.area(shape, geometry, matrix)
-        color = None
+        made = {"radiance": self.emission(emitter, "L", "power", scale_of)}
         if emitter.has("filename"):
             path = self.state.file(emitter.place, emitter.string("filename"))
             image = pixels(present(path, emitter.place_of("filename")))
-            self.losses.add(emitter.place, "an image that emits light", "its mean colour", large=True)
-            color = None if image is None else image.mean((0, 1)).tolist()
-        made = self.emission(emitter, "L", "power", scale_of)
-        if color is not None:
-            made = spectra.rgb(color, made.get("scale", 1))
+            if image is None:
+                self.losses.add(emitter.place, "an image that emits light", "even light", large=True)
+            elif emitter.number("power", -1) > 0:
+                self.losses.add(emitter.place, "the 'power' of an image that emits light",
+                                "that of a white one")
+            if image is not None and (light := emitted(image)) is not None:
+                scale = made["radiance"].get("scale", 1) if isinstance(made["radiance"], dict) else 1
+                made = {"radiance": spectra.scaled(light["radiance"], scale), "color": light["color"]}
         self.unused(emitter)
-        return {"radiance": made} | ({"two_sided": True} if two_sided else {})
+        return made | ({"two_sided": True} if two_sided else {})
 
 
 def lets_light_in(content):

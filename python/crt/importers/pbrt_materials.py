@@ -196,10 +196,18 @@ class Materials:
         return {"type": "thin_dielectric", "ior": self.index(found)}
 
     def of_diffusetransmission(self, found):
-        self.losses.add(found.place, f"{found}", "diffuse without transmission", large=True)
-        for name in ("transmittance", "scale"):
-            found.left.discard(name)
-        return {"type": "diffuse", "reflectance": self.values.reflectance(found, "reflectance", 0.25)}
+        scale = found.number("scale", 1)
+        both = {key: self.values.reflectance(found, key, 0.25) for key in ("reflectance", "transmittance")}
+        if scale != 1 and any("texture" in str(value) for value in both.values()):
+            self.losses.add(found.place, f"'scale' of {found} with a texture", "1")
+        elif scale != 1:
+            both = {key: spectra.scaled(value, scale) for key, value in both.items()}
+        most = sum(spectra.largest(value) for value in both.values())
+        if most > 1:
+            self.losses.add(found.place, f"reflectance and transmittance of {found} above 1 together",
+                            "as much less of both")
+            both = {key: spectra.scaled(value, 1 / most) for key, value in both.items()}
+        return {"type": "translucent"} | both
 
     def of_subsurface(self, found):
         self.losses.add(found.place, f"{found}", "plastic", large=True)

@@ -91,6 +91,14 @@ def scaled(spectrum, factor):
     return spectrum | {"scale": spectrum.get("scale", 1) * float(factor)}
 
 
+def largest(spectrum):
+    """The largest value of a reflectance by a number, a colour or a table; 0 of others."""
+    if isinstance(spectrum, (int, float)):
+        return spectrum
+    values = spectrum.get("rgb") or spectrum.get("table", {}).get("value", [0])
+    return max(values) * spectrum.get("scale", 1)
+
+
 LEAST_INDEX = 0.01
 
 
