@@ -161,7 +161,7 @@ TEST_CASE(
         REQUIRE(floats.adopted_neutral);
         CHECK((*floats.adopted_neutral)[0] == Approx(0.3804).margin(1e-3));  // A black body of 4000 K.
     }
-    for (const OutputFormat format : {OutputFormat::Png, OutputFormat::Ppm}) {
+    for (const OutputFormat format : {OutputFormat::Png, OutputFormat::Jpeg, OutputFormat::Ppm}) {
         const Image display = image(format);
         CHECK(display.pixels == shown.pixels);
         CHECK(metadataValue(display, kExposureKey) == "0.1");

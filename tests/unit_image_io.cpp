@@ -8,6 +8,7 @@
 #include "catch.h"
 #include "file_bytes.h"
 #include "image/image_io.h"
+#include "image/texels.h"
 #include "png_file.h"
 
 #include <fmt/format.h>
@@ -91,7 +92,9 @@ TEST_CASE("the extension says the format", "[image_io]") {
     CHECK(formatOfFile("a.b.PNG") == OutputFormat::Png);
     CHECK(formatOfFile("x.ppm") == OutputFormat::Ppm);
     CHECK(formatOfFile("x.Pfm") == OutputFormat::Pfm);
-    CHECK_FALSE(formatOfFile("x.jpg"));
+    CHECK(formatOfFile("x.jpg") == OutputFormat::Jpeg);
+    CHECK(formatOfFile("x.JPEG") == OutputFormat::Jpeg);
+    CHECK_FALSE(formatOfFile("x.tif"));
     CHECK_FALSE(formatOfFile("exr"));
 }
 
@@ -292,6 +295,33 @@ TEST_CASE("a PNG is 8-bit sRGB with its metadata", "[image_io]") {
     CHECK(*back.chromaticities == chromaticities(ColorSpace::LinearSrgb));
 }
 
+// Fails when colours are halved in resolution, when the codes are not sRGB, or when a comment is lost.
+TEST_CASE("a JPEG is 8-bit sRGB with its metadata as comments", "[image_io]") {
+    const TemporaryFolder directory;
+    const std::string path = directory / "image.jpg";
+    Image image = rgbImage(16, 8, {});
+    for (std::uint32_t i = 0; i < 16 * 8; ++i)  // columns of red and blue, one pixel wide
+        for (const float value : {i % 2 == 0 ? 0.5f : 0.0f, 0.25f, i % 2 == 0 ? 0.0f : 0.5f})
+            image.pixels.push_back(value);
+    image.metadata = {{"Software", "crt 0.1.0"}, {"crt/spp", "64"}};
+    writeImage(path, OutputFormat::Jpeg, image);
+    const std::string bytes = slurp(path);
+    CHECK(bytes.starts_with("\xff\xd8\xff"));
+    for (const char* comment : {"Software: crt 0.1.0", "crt/spp: 64"}) CHECK_THAT(bytes, Contains(comment));
+    const Texels texels = readTexels(path);
+    REQUIRE(texels.info.width == 16);
+    REQUIRE(texels.info.channels == 3);
+    const EncodedImage wanted = encodeSrgb8(image);
+    int worst = 0;
+    for (std::size_t i = 0; i < wanted.rgb.size(); ++i)
+        worst = std::max(worst, std::abs(int{texels.bytes[i]} - int{wanted.rgb[i]}));
+    CHECK(worst <= 12);  // With half the resolution of colours it is 90.
+    Image wide = rgbImage(65'536, 1, std::vector<float>(3 * 65'536, 0.5f));
+    CHECK_THROWS_WITH(writeImage(directory / "wide.jpg", OutputFormat::Jpeg, wide),
+                      Contains("cannot write") && Contains("65500"));
+    CHECK_FALSE(fs::exists(directory / "wide.jpg"));
+}
+
 TEST_CASE("damaged images are refused with a sentence", "[image_io]") {
     const TemporaryFolder directory;
     const std::string path = directory / "image.bad";
@@ -375,7 +405,7 @@ TEST_CASE("files of other formats and headers beyond the file's size are refused
 TEST_CASE("an image that lacks what it must have is refused", "[image_io]") {
     const TemporaryFolder directory;
     for (const OutputFormat format :
-         {OutputFormat::Exr, OutputFormat::Png, OutputFormat::Ppm, OutputFormat::Pfm}) {
+         {OutputFormat::Exr, OutputFormat::Png, OutputFormat::Jpeg, OutputFormat::Ppm, OutputFormat::Pfm}) {
         Image grey = rgbImage(1, 1, {1, 1, 1});
         grey.channels = {"X", "Y", "Z"};
         CHECK_THROWS_AS(writeImage(directory / "image", format, grey), Error);
@@ -521,7 +551,8 @@ TEST_CASE("(in a process of its own) without the image modules", "[.][image-io-n
     const struct {
         OutputFormat format;
         const char *module, *others;
-    } cases[] = {{OutputFormat::Exr, "crt_image_exr.so", ".png, .pfm and .ppm work without it"},
+    } cases[] = {{OutputFormat::Exr, "crt_image_exr.so", ".png, .jpg, .pfm and .ppm work without it"},
+                 {OutputFormat::Jpeg, "crt_image_plain.so", ".exr, .pfm and .ppm work without it"},
                  {OutputFormat::Png, "crt_image_plain.so", ".exr, .pfm and .ppm work without it"}};
     for (const auto& [format, module, others] : cases) {
         try {

@@ -1,5 +1,7 @@
 // The result of `crt import` for a model: the scene reads back as the model itself does, and materials,
 // textures, lights and cameras are what the formats say.
+//
+// Over 450 lines: one part of the formats after the other, each short.
 #include "imported.h"
 
 #include "scene/import/scene_text.h"
@@ -263,6 +265,31 @@ TEST_CASE("Extensions of materials become keys of OpenPBR", "[gltf][import]") {
         Contains("emission: {radiance: {rgb: [1, 0.5, 0], space: linear, scale: 2}, two_sided: true}"));
     CHECK_THAT(textOf("KHR_materials_unlit", Json::object()),
                Contains("reflectance: 0\n") && Contains("scale: 1}, two_sided: true}"));
+}
+
+// Fails when the default is taken, or the list of another variant.
+TEST_CASE("A variant of a file's materials is chosen by its name", "[gltf][import]") {
+    GltfMaker maker = squareFile();
+    for (const char* name : {"plain", "red", "blue"}) maker.add("materials", {{"name", name}});
+    maker.root["extensionsUsed"] = {"KHR_materials_variants"};
+    maker.root["extensions"]["KHR_materials_variants"]["variants"] = {{{"name", "day"}},
+                                                                      {{"name", "night"}}};
+    Json& primitive = maker.root["meshes"][0]["primitives"][0];
+    primitive["material"] = 0;
+    primitive["extensions"]["KHR_materials_variants"]["mappings"] = {{{"material", 1}, {"variants", {0}}},
+                                                                     {{"material", 2}, {"variants", {1}}}};
+    const TemporaryFolder folder;
+    const std::string path = folder.write("a.glb", maker.glb());
+    const auto text = [&](const std::string& variant) {
+        const CapturedLog log;
+        GltfFiles files;
+        return importModel(files, path, {.folder = {}, .allow_outside = false, .variant = variant}).scene;
+    };
+    CHECK_THAT(text(""), Contains("material: plain") && Contains("picks one of 'day', 'night'"));
+    CHECK_THAT(text("day"), Contains("material: red") && !Contains("variants of materials"));
+    CHECK_THAT(text("night"), Contains("material: blue"));
+    CHECK_THROWS_WITH(text("nigth"), Contains("has no variant 'nigth', but 'day', 'night'") &&
+                                         Contains("did you mean 'night'?"));
 }
 
 // Found by the fuzzer: a factor of 3e38 became a scene that crt itself refuses.

@@ -87,7 +87,7 @@ TEST_CASE("outputs by extension, and the names that follow from them") {
     CHECK(plan.images[0].aovs == kAovDepth);
     CHECK(plan.images[1].aovs == 0);
     CHECK(besideOutput(plan.first, ".crtfilm") == "out/b.crtfilm");
-    CHECK_THROWS_AS(planOutputs({"b.jpg"}, scene), Error);
+    CHECK_THROWS_AS(planOutputs({"b.tif"}, scene), Error);
     CHECK_THROWS_AS(planOutputs({"b.exr", "./b.exr"}, scene), Error);
 }
 

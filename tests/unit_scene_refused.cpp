@@ -1,4 +1,6 @@
 // Scene YAML: for every kind of mistake the message names place, reason and remedy.
+//
+// Over 450 lines: one kind of mistake after the other.
 #include "scene_texts.h"
 
 #include "base/temporary_folder.h"
@@ -101,7 +103,7 @@ TEST_CASE("unknown, misspelt and duplicate keys", "[scene_yaml][refused]") {
                Contains("'fov' and 'focal_length' in camera exclude each other") &&
                    Contains("'focal_length' in camera needs 'sensor' too"));
     CHECK_THAT(refused("objects: [{material: m}]\n"),
-               Contains("object 0 needs obj or ply or gltf or mesh or"));
+               Contains("object 0 needs obj or ply or stl or gltf or mesh or"));
 }
 
 TEST_CASE("columns count characters, not bytes", "[scene_yaml][refused]") {
@@ -423,9 +425,10 @@ TEST_CASE("objects that cannot be", "[scene_yaml][refused]") {
 
 TEST_CASE("outputs that cannot be", "[scene_yaml][refused]") {
     CHECK_THAT(
-        refused("outputs: [{file: a.jpg}]\n"),
-        Contains(
-            "scene.yaml:2:18: error: 'a.jpg' does not end in one of .exr, .png, .ppm, .pfm; add 'format'"));
+        refused("outputs: [{file: a.pgn}]\n"),
+        Contains("2:18: error: 'a.pgn' does not end in .exr, .png, .jpg, .ppm or .pfm; add 'format'") &&
+            Contains("did you mean 'png'?"));
+    CHECK(parse("outputs: [{file: a.JPG}]\n").outputs[0].format == OutputFormat::Jpeg);
     CHECK_THAT(refused("outputs: [{file: a.png, aovs: [depth]}]\n"),
                Contains("only exr files can hold AOVs"));
     CHECK_THAT(refused("outputs: [{file: a.exr, aovs: [dpeth]}]\n"), Contains("did you mean 'depth'?"));

@@ -1,4 +1,6 @@
 // Scene YAML: what good scenes become, what overrides change, and the documents that come of the schema.
+//
+// Over 450 lines: every kind of value once.
 #include "scene_texts.h"
 
 #include "base/temporary_folder.h"
@@ -120,6 +122,7 @@ TEST_CASE("the choices of the schema are in the order of the enumerations", "[sc
     all("output", "format",
         std::map<std::string, OutputFormat>{{"exr", OutputFormat::Exr},
                                             {"png", OutputFormat::Png},
+                                            {"jpeg", OutputFormat::Jpeg},
                                             {"ppm", OutputFormat::Ppm},
                                             {"pfm", OutputFormat::Pfm}},
         [](const std::string& name) {

@@ -152,7 +152,7 @@ std::vector<Case> screenCases() {
                 "variance of a path under the one bright texel",
                 "the irradiance of the picture, by the midpoint rule with 1,024² points; texels; 20 times "
                 "the mean squared",
-                "", "± 0.3 %, ± 0.1 %; 20", Level::Commit,
+                "quadrature", "± 0.3 %, ± 0.1 %; 20", Level::Commit,
                 CRT_FEATURE_EMISSION_IMAGE | CRT_FEATURE_FACTOR | CRT_FEATURE_TEXTURE |
                     CRT_FEATURE_AREA_LIGHT | CRT_FEATURE_NEE | CRT_FEATURE_DIFFUSE | CRT_FEATURE_LIGHT_TREE |
                     CRT_FEATURE_TABLE,

@@ -127,9 +127,8 @@ void Film::saveImage(const std::string& path, Watch* watch) const {
         const auto& [film, identity] = impl_->film;
         const std::optional<OutputFormat> format = formatOfFile(path);
         if (!format)
-            throw crt::Error(
-                crt::ErrorKind::Usage,
-                fmt::format("the name of the image '{}' does not end in .exr, .png, .ppm or .pfm", path));
+            throw crt::Error(crt::ErrorKind::Usage,
+                             fmt::format("the name of the image '{}' does not end in {}", path, kImageEnds));
         checkWritable(path);
         // An EXR holds the AOVs that the scene requests.
         const std::uint32_t aovs = *format == OutputFormat::Exr ? identity.record->aovs : 0;

@@ -16,9 +16,8 @@ void Image::save(const std::string& path, Watch* watch) const {
     api::acrossBorder(watch, [&] {
         const std::optional<OutputFormat> format = formatOfFile(path);
         if (!format)
-            throw crt::Error(
-                crt::ErrorKind::Usage,
-                fmt::format("the name of the image '{}' does not end in .exr, .png, .ppm or .pfm", path));
+            throw crt::Error(crt::ErrorKind::Usage,
+                             fmt::format("the name of the image '{}' does not end in {}", path, kImageEnds));
         checkWritable(path);
         writeImage(path, *format, impl_->image);
     });

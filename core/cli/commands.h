@@ -15,6 +15,7 @@ Command importCommand();
 Command compareCommand();
 Command mergeCommand();
 Command developCommand();
+Command denoiseCommand();
 Command convergeCommand();
 Command referenceCommand();
 Command verifyCommand();

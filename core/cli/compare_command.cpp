@@ -198,7 +198,7 @@ OptionGroup moreToSee(CompareArguments& to) {
               .completion = completeImage()},
              {.names = "--diff",
               .placeholder = "FILE",
-              .help = "write the difference: values to .exr or .pfm, colours to .png or .ppm",
+              .help = "write the difference: values to .exr or .pfm, colours to .png, .jpg or .ppm",
               .read = [&to](const std::string& text) { to.difference_file = text; },
               .completion = completeImage()},
              {.names = "--map",

@@ -247,7 +247,7 @@ Command developCommand() {
         .groups = {{"Options",
                     {{.names = "-o,--output",
                       .placeholder = "FILE",
-                      .help = ".exr .png .ppm or .pfm; -.png for a pipe; repeatable",
+                      .help = ".exr .png .jpg .ppm or .pfm; -.png for a pipe; repeatable",
                       .read = [to](const std::string& text) { to->outputs.push_back(text); },
                       .completion = completeImage(),
                       .repeatable = true,

@@ -28,7 +28,7 @@ ignores or approximates and the values that it chose.
 )";
 
 struct Request {
-    std::string model, output;
+    std::string model, output, variant;
     bool allow_outside = false, overwrite = false;
 };
 
@@ -48,12 +48,16 @@ int import(const Request& request) {
         throw Error(ErrorKind::Usage, fmt::format("'{}' is a {} scene; {}", request.model, other,
                                                   importHint(request.model)));
     if (!isModel(request.model))
-        throw Error(ErrorKind::Usage,
-                    fmt::format("crt cannot import '{}': it reads .glb, .gltf, .obj and .ply",
-                                request.model));
+        throw Error(
+            ErrorKind::Usage,
+            fmt::format("crt cannot import '{}': it reads .glb, .gltf, .obj, .ply and .stl", request.model));
     const bool to_file = !request.output.empty() && request.output != "-";
     ImportOptions options;
     options.allow_outside = request.allow_outside;
+    options.variant = request.variant;
+    const std::string end = extensionOf(request.model);
+    if (!request.variant.empty() && end != ".glb" && end != ".gltf")
+        throw Error(ErrorKind::Usage, "--variant is for glTF files: others have no variants of materials");
     if (to_file) {
         refuseOverInputs({request.model}, {request.output}, {});
         options.folder = fs::path(request.output).parent_path().string();
@@ -75,11 +79,11 @@ int import(const Request& request) {
 Command importCommand() {
     const auto request = std::make_shared<Request>();
     return {.name = "import",
-            .summary = "convert a model (glTF, GLB, OBJ, PLY) into a scene",
+            .summary = "convert a model (glTF, GLB, OBJ, PLY, STL) into a scene",
             .arguments = {{.name = "MODEL",
-                           .help = "a .glb, .gltf, .obj or .ply file",
+                           .help = "a .glb, .gltf, .obj, .ply or .stl file",
                            .read = [request](const std::string& text) { request->model = text; },
-                           .completion = completeFile({"glb", "gltf", "obj", "ply"})}},
+                           .completion = completeFile({"glb", "gltf", "obj", "ply", "stl"})}},
             .groups = {{"Options",
                         {{.names = "-o,--output",
                           .placeholder = "SCENE",
@@ -90,6 +94,10 @@ Command importCommand() {
                           .placeholder = {},
                           .help = "replace an existing scene",
                           .read = [request](const std::string&) { request->overwrite = true; }},
+                         {.names = "--variant",
+                          .placeholder = "NAME",
+                          .help = "the materials of this variant of a glTF file (KHR_materials_variants)",
+                          .read = [request](const std::string& text) { request->variant = text; }},
                          {.names = "--allow-outside",
                           .placeholder = {},
                           .help = "let a glTF file use buffers and images outside its folder",

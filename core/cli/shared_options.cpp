@@ -116,7 +116,7 @@ Option quietOption(const char* help) {
 }
 
 Completion completeScene() {
-    return completeFile({"yaml", "yml", "glb", "gltf", "obj", "ply", "xml", "pbrt"});
+    return completeFile({"yaml", "yml", "glb", "gltf", "obj", "ply", "stl", "xml", "pbrt"});
 }
 Completion completeImage() { return completeFile({"exr", "png", "ppm", "pfm"}); }
 Completion completeFilm() { return completeFile({"crtfilm"}); }

@@ -240,7 +240,9 @@ void writeExr(const std::string& path, const Image& image) {
     file.commit();
 }
 
-void writePng(const std::string& path, const Image& image, const EncodedImage& encoded) {
+/// A PNG or a JPEG.
+void writeWithMetadata(const std::string& path, OutputFormat format, const Image& image,
+                       const EncodedImage& encoded) {
     const CrtImageModule& module = imageModule(ModuleFormat::Plain, path, ErrorKind::Output);
     std::vector<CrtImageText> metadata = texts(image);
     // The colour space of the image is not that of the pixels any more.
@@ -248,9 +250,9 @@ void writePng(const std::string& path, const Image& image, const EncodedImage& e
         if (std::strcmp(text.name, kColorInteropIdKey) == 0) text.value = kDisplaySrgbId;
     AtomicFile file(path);
     Reason reason{};
-    if (module.write_png(file.temporaryPath().c_str(), image.width, image.height, encoded.rgb.data(),
-                         metadata.data(), static_cast<std::uint32_t>(metadata.size()), reason.data(),
-                         reason.size()) != 0)
+    const auto write = format == OutputFormat::Jpeg ? module.write_jpeg : module.write_png;
+    if (write(file.temporaryPath().c_str(), image.width, image.height, encoded.rgb.data(), metadata.data(),
+              static_cast<std::uint32_t>(metadata.size()), reason.data(), reason.size()) != 0)
         refuseToWrite(path, reason.data());
     file.commit();
 }
@@ -320,6 +322,7 @@ std::optional<OutputFormat> formatOfFile(const std::string& path) {
     for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
     if (extension == ".exr") return OutputFormat::Exr;
     if (extension == ".png") return OutputFormat::Png;
+    if (extension == ".jpg" || extension == ".jpeg") return OutputFormat::Jpeg;
     if (extension == ".ppm") return OutputFormat::Ppm;
     if (extension == ".pfm") return OutputFormat::Pfm;
     return std::nullopt;
@@ -337,14 +340,14 @@ void writeImage(const std::string& path, OutputFormat format, const Image& image
         case OutputFormat::Exr: return writeExr(path, image);
         case OutputFormat::Pfm: return writePfm(path, image);
         case OutputFormat::Png:
+        case OutputFormat::Jpeg:
         case OutputFormat::Ppm: break;
     }
     const EncodedImage encoded = encodeSrgb8(image);
-    if (format == OutputFormat::Png) {
-        writePng(path, image, encoded);
-    } else {
+    if (format == OutputFormat::Ppm)
         writePpm(path, image, encoded);
-    }
+    else
+        writeWithMetadata(path, format, image, encoded);
     tellWhatIsLost(path, image, encoded);
 }
 

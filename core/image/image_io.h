@@ -1,8 +1,8 @@
-/// Images to files and back. PFM and PPM are written here; EXR and PNG go through the codec module
-/// (image_module.h), which is opened when the first of them is read or written and not before.
+/// Images to files and back. PFM and PPM are written here; EXR, PNG and JPEG go through the codec modules
+/// (image_module.h), which are opened when the first such file is read or written and not before.
 ///
-/// Values. EXR and PFM hold linear floats as they are, whatever the colour space. PNG and PPM are 8-bit
-/// sRGB: an image in ACEScg or XYZ is converted to linear sRGB first, then encoded (IEC 61966-2-1) and
+/// Values. EXR and PFM hold linear floats as they are, whatever the colour space. PNG, JPEG and PPM are
+/// 8-bit sRGB: an image in ACEScg or XYZ is converted to linear sRGB first, then encoded (IEC 61966-2-1) and
 /// rounded; what lies outside [0,1] is clipped and counted. Reading gives linear values back.
 ///
 /// Files are written under a temporary name and renamed. checkWritable() (atomic_file.h) says beforehand
@@ -19,11 +19,12 @@
 
 namespace crt {
 
-/// By the extension, whatever its case: ".exr", ".png", ".ppm", ".pfm".
+/// By the extension, whatever its case: ".exr", ".png", ".jpg" and ".jpeg", ".ppm", ".pfm".
 std::optional<OutputFormat> formatOfFile(const std::string& path);
 
 /// Writes `image`, which has the channels R, G and B. EXR keeps every channel (float, or uint32 for the
-/// integer ones), the metadata and the chromaticities; PNG keeps the metadata; PFM and PPM keep neither.
+/// integer ones), the metadata and the chromaticities; PNG and JPEG keep the metadata; PFM and PPM keep
+/// neither.
 /// Throws crt::Error(Output).
 void writeImage(const std::string& path, OutputFormat format, const Image& image);
 

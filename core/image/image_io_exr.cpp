@@ -25,6 +25,7 @@ extern "C" const CrtImageModule* CRT_IMAGE_MODULE_ENTRY(void) {
                                       nullptr,
                                       nullptr,
                                       nullptr,
+                                      nullptr,
                                       nullptr};
     return &table;
 }

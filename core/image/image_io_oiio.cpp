@@ -241,6 +241,7 @@ extern "C" const CrtImageModule* CRT_IMAGE_MODULE_ENTRY(void) {
                                       "OpenImageIO " OIIO_VERSION_STRING,
                                       nullptr,
                                       nullptr,
+                                      nullptr,
                                       readImage,
                                       freeImage,
                                       readPartBy<TexelPart::Color, readPart>,

@@ -4,6 +4,7 @@
 #include "image/image_bounds.h"
 #include "image/image_module.h"
 #include "image/jpeg_reader.h"
+#include "image/jpeg_writer.h"
 #include "image/module_support.h"
 #include "image/png_codec.h"
 #include "image/png_header.h"
@@ -179,6 +180,13 @@ std::int32_t writePngFile(const char* path, std::uint32_t width, std::uint32_t h
                    [&] { writePng(path, width, height, rgb, metadata, metadata_count); });
 }
 
+std::int32_t writeJpegFile(const char* path, std::uint32_t width, std::uint32_t height,
+                           const std::uint8_t* rgb, const CrtImageText* metadata,
+                           std::uint32_t metadata_count, char* reason, std::uint32_t reason_size) {
+    return guarded(reason, reason_size,
+                   [&] { require(writeJpeg(path, width, height, rgb, metadata, metadata_count)); });
+}
+
 }  // namespace
 
 extern "C" __attribute__((visibility("default"))) const CrtImageModule* CRT_IMAGE_MODULE_ENTRY(void);
@@ -189,6 +197,7 @@ extern "C" const CrtImageModule* CRT_IMAGE_MODULE_ENTRY(void) {
                                       "libpng " PNG_LIBPNG_VER_STRING,
                                       nullptr,
                                       writePngFile,
+                                      writeJpegFile,
                                       readImage,
                                       freeImage,
                                       readPartBy<TexelPart::Color, readPart>,

@@ -24,8 +24,8 @@ extern "C" {
 #define CRT_IMAGE_EXR_WRITER_FILE "crt_image_exr.so"
 #define CRT_IMAGE_EXR_READER_FILE "crt_image_oiio.so"
 /* The symbol carries the version: a module of another version does not have it. */
-#define CRT_IMAGE_MODULE_ENTRY crt_image_module_v7
-#define CRT_IMAGE_MODULE_ENTRY_NAME "crt_image_module_v7"
+#define CRT_IMAGE_MODULE_ENTRY crt_image_module_v8
+#define CRT_IMAGE_MODULE_ENTRY_NAME "crt_image_module_v8"
 
 typedef struct CrtImageText {
     const char *name;
@@ -96,6 +96,10 @@ typedef struct CrtImageModule {
     int32_t (*write_png)(const char* path, uint32_t width, uint32_t height, const uint8_t* rgb,
                          const CrtImageText* metadata, uint32_t metadata_count, char* reason,
                          uint32_t reason_size);
+    /* The same as a JPEG. */
+    int32_t (*write_jpeg)(const char* path, uint32_t width, uint32_t height, const uint8_t* rgb,
+                          const CrtImageText* metadata, uint32_t metadata_count, char* reason,
+                          uint32_t reason_size);
     /* EXR, or PNG and Radiance HDR, by content; the first image of a file that holds several. One whose
        pixels take more than most_bytes is refused. *image stays valid until freed. */
     int32_t (*read)(const char *path, uint64_t most_bytes, const CrtImagePlanes **image, char *reason,

@@ -3,8 +3,8 @@
 #include "image/exif_orientation.h"
 #include "image/icc_profile.h"
 #include "image/image_bounds.h"
+#include "image/jpeg_errors.h"
 
-#include <csetjmp>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -12,7 +12,6 @@
 #include <string>
 #include <string_view>
 
-#include <jpeglib.h>
 // After jpeglib.h, which it needs.
 #include <jerror.h>
 
@@ -25,18 +24,6 @@ constexpr int kMostScans = 64;
 
 constexpr int kExifMarker = JPEG_APP0 + 1, kProfileMarker = JPEG_APP0 + 2;
 
-struct Errors {
-    jpeg_error_mgr manager;  // First: libjpeg knows the address of this alone.
-    std::jmp_buf escape;
-    char sentence[JMSG_LENGTH_MAX] = {};
-};
-
-[[noreturn]] void fail(j_common_ptr codec) {
-    auto* const errors = reinterpret_cast<Errors*>(codec->err);
-    codec->err->format_message(codec, errors->sentence);
-    std::longjmp(errors->escape, 1);
-}
-
 /// Level -1 is damaged data, of which libjpeg makes the best; here they are failures, but for what costs no
 /// pixel.
 void warn(j_common_ptr codec, int level) {
@@ -44,13 +31,13 @@ void warn(j_common_ptr codec, int level) {
     const int code = codec->err->msg_code;
     if (code != JWRN_EXTRANEOUS_DATA && code != JWRN_ADOBE_XFORM && code != JWRN_JFIF_MAJOR &&
         code != JWRN_BOGUS_ICC)
-        fail(codec);
+        failJpeg(codec);
 }
 
 void countScans(j_common_ptr codec) {
     auto* const reader = reinterpret_cast<j_decompress_ptr>(codec);
     if (reader->input_scan_number <= kMostScans) return;
-    auto* const errors = reinterpret_cast<Errors*>(codec->err);
+    auto* const errors = reinterpret_cast<JpegErrors*>(codec->err);
     std::snprintf(errors->sentence, sizeof errors->sentence, "it has more than %d scans", kMostScans);
     std::longjmp(errors->escape, 1);
 }
@@ -90,7 +77,7 @@ void takeProfile(jpeg_decompress_struct& codec, CrtTexelsInfo& info) {
 /// All that lives beyond a jump: nothing here has a destructor.
 struct Reader {
     jpeg_decompress_struct codec;
-    Errors errors;
+    JpegErrors errors;
     jpeg_progress_mgr progress;
 };
 
@@ -99,7 +86,7 @@ bool decode(Reader& reader, std::FILE* file, CrtTexelsInfo* info, unsigned char*
             std::uint64_t buffer_bytes) {
     jpeg_decompress_struct& codec = reader.codec;
     codec.err = jpeg_std_error(&reader.errors.manager);
-    reader.errors.manager.error_exit = fail;
+    reader.errors.manager.error_exit = failJpeg;
     reader.errors.manager.emit_message = warn;
     if (setjmp(reader.errors.escape) != 0) return false;
     jpeg_create_decompress(&codec);

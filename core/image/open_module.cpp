@@ -79,7 +79,7 @@ const CrtImageModule& imageModule(ModuleFormat format, const std::string& path, 
         return *opened.table;
     };
     if (format == ModuleFormat::Exr) {
-        constexpr const char* kOthers = ".png, .pfm and .ppm";
+        constexpr const char* kOthers = ".png, .jpg, .pfm and .ppm";
         if (kind == ErrorKind::Output) {
             static const Opened writer = open(CRT_IMAGE_EXR_WRITER_FILE);
             return require(writer, kOthers);

@@ -40,7 +40,7 @@ fs::path below(const fs::path& folder, const fs::path& path) {
     return way.empty() || *way.begin() == ".." || way == "." ? fs::path() : way;
 }
 
-/// True if a file begins as the images that crt writes. EXR and PNG also name crt in their metadata.
+/// True if a file begins as the images that crt writes. EXR, PNG and JPEG also name crt in their metadata.
 bool isImageOfCrt(const std::string& path, OutputFormat format) {
     constexpr std::size_t kMetadata = 65536;
     std::ifstream file(path, std::ios::binary);
@@ -54,6 +54,7 @@ bool isImageOfCrt(const std::string& path, OutputFormat format) {
     switch (format) {
         case OutputFormat::Exr: return begins("\x76\x2f\x31\x01") && named;
         case OutputFormat::Png: return begins("\x89PNG") && named;
+        case OutputFormat::Jpeg: return begins("\xff\xd8\xff") && named;
         case OutputFormat::Ppm: return begins("P6");
         case OutputFormat::Pfm: return begins("PF") || begins("Pf");
     }
@@ -124,7 +125,7 @@ void refuseForeignPlaces(const std::vector<Output>& outputs, const std::string& 
             refuse("lies outside the working directory and the folder of the scene");
         for (const fs::path& part : way)
             if (part.string().front() == '.') refuse("is a hidden file or lies in a hidden folder");
-        if (!formatOfFile(output.file)) refuse("does not end in .exr, .png, .ppm or .pfm");
+        if (!formatOfFile(output.file)) refuse(fmt::format("does not end in {}", kImageEnds));
         std::error_code unreadable;
         if (!replace && fs::exists(output.file, unreadable) && !isImageOfCrt(output.file, output.format))
             refuse("would replace a file that crt did not write; add --overwrite to replace it");

@@ -43,11 +43,9 @@ OutputPlan planOutputs(const std::vector<std::string>& files, const Scene& scene
                 const std::uint32_t aovs = *format == OutputFormat::Exr ? requestedAovs(scene) : 0;
                 plan.images.push_back({.file = file, .format = *format, .aovs = aovs, .place = {}});
             } else {
-                throw Error(
-                    ErrorKind::Usage,
-                    fmt::format(
-                        "the name of the output '{}' does not end in .exr, .png, .ppm, .pfm or .crtfilm",
-                        file));
+                throw Error(ErrorKind::Usage,
+                            fmt::format("the name of the output '{}' does not end in {}, nor in .crtfilm",
+                                        file, kImageEnds));
             }
         }
     }

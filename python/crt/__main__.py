@@ -10,7 +10,8 @@ from .errors import Error
 from .importers import is_foreign
 
 # Command: the module whose main(arguments) it is. It returns the exit code.
-COMMANDS = {"import": ".importers.command", "report": ".report", "slurm": ".slurm"}
+COMMANDS = {"denoise": ".denoise_command", "import": ".importers.command", "report": ".report",
+            "slurm": ".slurm"}
 
 
 def main(arguments=None):

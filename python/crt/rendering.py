@@ -48,8 +48,8 @@ class Result:
         return planes(self.film, self.film.aovs)
 
     def save(self, path):
-        """Writes the image as `crt render` does, with all metadata: .exr, .png, .ppm or .pfm; or the film,
-        as .crtfilm. Raises crt.Error of kind OUTPUT."""
+        """Writes the image as `crt render` does, with all metadata: .exr, .png, .jpg, .ppm or .pfm; or the
+        film, as .crtfilm. Raises crt.Error of kind OUTPUT."""
         path = os.fspath(path)
         (self.film.save if path.endswith(".crtfilm") else self.film.save_image)(path)
         self.saved.append(os.path.realpath(path))

@@ -15,7 +15,7 @@ from .sample_ranges import Missing
 from .scenes import load
 from .slurm_scripts import merge_script, render_script, submit_script
 
-IMAGES = (".exr", ".png", ".ppm", ".pfm", ".crtfilm")
+IMAGES = (".exr", ".png", ".jpg", ".jpeg", ".ppm", ".pfm", ".crtfilm")
 
 DESCRIPTION = """Writes scripts that render a scene on a Slurm cluster:
 

@@ -42,7 +42,7 @@ void bindImage(nb::module_& module) {
         .def(
             "save", [](const crt::Image& image, const std::string& path) { image.save(path); }, "path"_a,
             nb::call_guard<nb::gil_scoped_release>(),
-            "By the extension: .exr keeps everything, .pfm floats, .png and .ppm 8 bits of sRGB.")
+            "By the extension: .exr keeps everything, .pfm floats, .png, .jpg and .ppm 8 bits of sRGB.")
         .def("__repr__", &describe)
         .def_prop_ro("width", &crt::Image::width)
         .def_prop_ro("height", &crt::Image::height)

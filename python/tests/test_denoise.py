@@ -124,3 +124,17 @@ def test_without_the_libraries_it_names_them(monkeypatch, box):
     monkeypatch.setitem(sys.modules, "pyoidn", None)
     with pytest.raises(crt.Error, match=r"pip install pyoidn OpenEXR"):
         crt.denoise(crt.render(box, spp=4))
+
+
+def test_the_command_guesses_beside_the_film(oidn, tmp_path, capfd):
+    """`crt denoise`: both formats of one film, the metadata say so, and the film is left as it is."""
+    from crt.__main__ import main
+    crt.render(crt.scene(AOVS, set=SIZE), spp=4).save(tmp_path / "a.crtfilm")
+    before = (tmp_path / "a.crtfilm").read_bytes()
+    names = [str(tmp_path / name) for name in ("a.exr", "a.png")]
+    assert main(["denoise", str(tmp_path / "a.crtfilm"), "-o", names[0], "-o", names[1]]) == 0
+    assert "4 samples a pixel, with albedo and normal; a guess" in capfd.readouterr().err
+    assert "4 samples a pixel" in oidn.File(names[0], header_only=True).header()["crt/denoised"]
+    assert (tmp_path / "a.crtfilm").read_bytes() == before
+    assert main(["denoise", str(tmp_path / "a.crtfilm"), "-o", str(tmp_path / "a.crtfilm")]) != 0
+    assert (tmp_path / "a.crtfilm").read_bytes() == before

@@ -133,8 +133,8 @@ def test_what_is_no_scene_is_refused_with_all_endings(tmp_path):
     for arguments in (["s.yaml"], ["-o", "m.obj", "s.yaml"]):
         done = run(*arguments, cwd=tmp_path)
         assert done.returncode == 2 and done.stderr == (
-            "crt: error: crt cannot import 's.yaml': it reads .glb, .gltf, .obj, .ply, .xml, .pbrt and "
-            ".pbrt.gz\n")
+            "crt: error: crt cannot import 's.yaml': it reads .glb, .gltf, .obj, .ply, .stl, .xml, "
+            ".pbrt and .pbrt.gz\n")
 
 
 def test_the_program_hands_scenes_of_other_renderers_over(tmp_path):

@@ -57,7 +57,9 @@ def test_a_bitmap_that_emits_stays_an_image(tmp_path, shape):
     emission = made.content["objects"][0]["emission"]
     assert emission["radiance"] == {"rgb": [1, 1, 1], "space": "linear", "scale": 8}
     assert emission["color"]["filter"] == "nearest"
-    assert "mesh" in made.content["objects"][0]
+    assert {"mesh", "rectangle"} & set(made.content["objects"][0])
+    seen = imported(path, 256)[..., 1]
+    assert seen.max() == pytest.approx(4, rel=0.05) and 0.05 < np.count_nonzero(seen) / seen.size < 0.5
     assert not [loss for loss in made.losses if "emits" in loss.what]
 
 

@@ -35,6 +35,7 @@ OTHER_TARGETS = {
     "image/image_io_exr.cpp",
     "image/png_header.cpp",
     "image/jpeg_reader.cpp",
+    "image/jpeg_writer.cpp",
     "image/png_reader.cpp",
     "image/radiance_reader.cpp",
     "image/tga_reader.cpp",

@@ -20,15 +20,15 @@ constexpr const char* kPackageIsThere =
     "places = found and found.submodule_search_locations or []\n"
     "sys.exit(not any(os.path.isfile(os.path.join(place, 'foreign_scenes.py')) for place in places))\n";
 
-/// python -m crt, but for the working directory. A missing module ends with a sentence: users of such
-/// scenes need not know that Python reads them.
+/// python -m crt, but for the working directory. A missing module ends with a sentence: users need not know
+/// that Python does the work.
 constexpr const char* kRunPackage =
     "import runpy, sys\n"
     "sys.path[:] = [folder for folder in sys.path if folder]\n"
     "try:\n"
     "    runpy.run_module('crt', run_name='__main__', alter_sys=True)\n"
     "except ModuleNotFoundError as missing:\n"
-    "    print(f'crt: error: the Python package that converts scenes of other renderers needs the '\n"
+    "    print(f'crt: error: the Python package that does this needs the '\n"
     "          f'module {missing.name!r}, which {sys.executable} lacks; install it '\n"
     "          f'({sys.executable} -m pip install {missing.name}), or name another Python in CRT_PYTHON',\n"
     "          file=sys.stderr)\n"

@@ -17,8 +17,8 @@ class CRT_API Image {
 public:
     /// PFM, PPM, EXR, PNG or Radiance HDR, by content; values are linear. Throws crt::Error of kind Usage.
     static Image load(const std::string& path);
-    /// By the extension: .exr keeps everything, .pfm the floats of R, G and B, .png and .ppm 8 bits of sRGB.
-    /// Written under another name and renamed. Throws crt::Error of kind Output; Usage for another
+    /// By the extension: .exr keeps everything, .pfm the floats of R, G and B, .png, .jpg and .ppm 8 bits of
+    /// sRGB. Written under another name and renamed. Throws crt::Error of kind Output; Usage for another
     /// extension.
     void save(const std::string& path, Watch* watch = nullptr) const;
 

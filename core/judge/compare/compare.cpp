@@ -289,8 +289,7 @@ Image falseColorDifference(const Image& a, const Image& b) {
 void writeDifference(const std::string& path, const Image& a, const Image& b) {
     const std::optional<OutputFormat> format = formatOfFile(path);
     if (!format)
-        throw Error(ErrorKind::Usage,
-                    fmt::format("'{}' does not end in .exr, .pfm, .png or .ppm", path), {path});
+        throw Error(ErrorKind::Usage, fmt::format("'{}' does not end in {}", path, kImageEnds), {path});
     const bool as_values = *format == OutputFormat::Exr || *format == OutputFormat::Pfm;
     writeImage(path, *format, as_values ? differenceImage(a, b) : falseColorDifference(a, b));
 }

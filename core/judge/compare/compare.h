@@ -83,7 +83,7 @@ Image differenceImage(const Image& a, const Image& b);
 /// rounding) over green (10⁻⁴) to red (10⁻¹ and more) by the largest difference of the pixel; magenta
 /// where a value is not finite. Linear sRGB.
 Image falseColorDifference(const Image& a, const Image& b);
-/// Writes the difference: as values to .exr and .pfm, in false colour to .png and .ppm. Throws
+/// Writes the difference: as values to .exr and .pfm, in false colour to .png, .jpg and .ppm. Throws
 /// crt::Error(Usage) for another extension or images that do not match, crt::Error(Output) when it cannot be
 /// written.
 void writeDifference(const std::string& path, const Image& a, const Image& b);

@@ -418,8 +418,7 @@ void writeZMap(const std::string& path, const NoiseComparison& noise, std::uint3
                std::uint32_t height) {
     const std::optional<OutputFormat> format = formatOfFile(path);
     if (!format)
-        throw Error(ErrorKind::Usage,
-                    fmt::format("'{}' does not end in .exr, .pfm, .png or .ppm", path), {path});
+        throw Error(ErrorKind::Usage, fmt::format("'{}' does not end in {}", path, kImageEnds), {path});
     if (noise.z.empty())
         throw Error(ErrorKind::Usage,
                     fmt::format("there is no z map to write: {}",

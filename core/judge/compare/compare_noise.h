@@ -78,8 +78,8 @@ NoiseComparison compareNoise(const Image& a, const Image& b);
 /// To look at: white where z is 0, red where a is brighter, blue where it is darker, full colour from |z| =
 /// 5; black where there is no noise to compare with. The largest |z| of the channels counts.
 Image zMap(const NoiseComparison& noise, std::uint32_t width, std::uint32_t height);
-/// Writes it: z itself to .exr and .pfm, colours to .png and .ppm. Throws crt::Error(Usage) when there is no
-/// z or for another extension, crt::Error(Output).
+/// Writes it: z itself to .exr and .pfm, colours to .png, .jpg and .ppm. Throws crt::Error(Usage) when there
+/// is no z or for another extension, crt::Error(Output).
 void writeZMap(const std::string& path, const NoiseComparison& noise, std::uint32_t width,
                std::uint32_t height);
 

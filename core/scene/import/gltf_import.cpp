@@ -7,6 +7,7 @@
 #include "scene/gltf/gltf_tangents.h"
 #include "scene/import/gltf_graph.h"
 #include "scene/import/gltf_materials.h"
+#include "scene/import/gltf_variants.h"
 #include "scene/light_units.h"
 #include "scene/scene.h"
 #include "spectra/spectra.h"
@@ -37,11 +38,13 @@ std::string steps(const Matrix4d& world) {
 
 class Writer {
 public:
-    Writer(GltfFile& file, std::string file_name, std::string folder, bool allow_outside, Losses& losses)
+    Writer(GltfFile& file, std::string file_name, std::string folder, const ImportOptions& options,
+           Losses& losses)
         : file_(file),
           model_(file.model()),
           file_name_(std::move(file_name)),
-          allow_outside_(allow_outside),
+          allow_outside_(options.allow_outside),
+          variants_(file, options.variant, losses),
           losses_(losses),
           graph_(readGltfGraph(file, losses)),
           textures_(file, file_name_, std::move(folder), losses),
@@ -75,6 +78,7 @@ private:
     const tinygltf::Model& model_;
     std::string file_name_;
     bool allow_outside_;
+    GltfVariants variants_;
     Losses& losses_;
     GltfGraph graph_;
     GltfTextures textures_;
@@ -124,7 +128,8 @@ std::string Writer::primitiveText(int mesh, std::size_t number, const std::vecto
         bounds_.add(placed.upper);
         extent += placed.radius() * placed.radius();
     }
-    GltfMaterialUse use{.material = primitive.material, .colors = primitive.attributes.contains("COLOR_0")};
+    GltfMaterialUse use{.material = variants_.materialOf(primitive),
+                        .colors = primitive.attributes.contains("COLOR_0")};
     if (use.colors && use.material >= 0 &&
         static_cast<std::size_t>(use.material) < model_.materials.size() &&
         model_.materials[static_cast<std::size_t>(use.material)].alphaMode != "OPAQUE")
@@ -213,7 +218,7 @@ std::vector<PaintedTriangle> Writer::paintedTriangles(std::size_t fewest_materia
     std::set<int> materials;
     forPrimitives([&](std::size_t mesh, std::size_t k, int accessor) {
         corners += worlds_[mesh].size() * model_.accessors[static_cast<std::size_t>(accessor)].count;
-        materials.insert(model_.meshes[mesh].primitives[k].material);
+        materials.insert(variants_.materialOf(model_.meshes[mesh].primitives[k]));
     });
     if (corners > 3 * kMostPaintedTriangles || materials.size() < fewest_materials)
         return triangles;
@@ -221,7 +226,8 @@ std::vector<PaintedTriangle> Writer::paintedTriangles(std::size_t fewest_materia
         if (worlds_[mesh].empty()) return;
         std::uint64_t without_area = 0;
         const Mesh read = readGltfPrimitive(file_, {.mesh = mesh, .primitive = k}, without_area);
-        const auto material = static_cast<std::uint32_t>(model_.meshes[mesh].primitives[k].material);
+        const auto material =
+            static_cast<std::uint32_t>(variants_.materialOf(model_.meshes[mesh].primitives[k]));
         for (const Matrix4d& world : worlds_[mesh]) {
             const bool mirrors = dot(cross(directionAt(world, {1, 0, 0}), directionAt(world, {0, 1, 0})),
                                      directionAt(world, {0, 0, 1})) < 0;
@@ -378,15 +384,12 @@ std::string Writer::lightsText() const {
 }  // namespace
 
 std::string gltfScene(GltfFile& file, const std::string& file_name, const std::string& folder,
-                      bool allow_outside, Losses& losses) {
+                      const ImportOptions& options, Losses& losses) {
     const tinygltf::Model& model = file.model();
     if (file.animationCount() > 0) losses.add("animations: objects keep their initial places");
     for (const std::string& name : model.extensionsUsed)
-        if (name == "KHR_materials_variants")
-            losses.add("variants of materials: crt uses the default materials");
-        else if (!knowsGltfExtension(name))
-            losses.add(fmt::format("the extension '{}'", name.substr(0, 60)));
-    return Writer(file, file_name, folder, allow_outside, losses).text();
+        if (!knowsGltfExtension(name)) losses.add(fmt::format("the extension '{}'", name.substr(0, 60)));
+    return Writer(file, file_name, folder, options, losses).text();
 }
 
 }  // namespace crt

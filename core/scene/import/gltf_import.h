@@ -2,6 +2,7 @@
 #pragma once
 
 #include "scene/gltf/gltf_file.h"
+#include "scene/import/import_options.h"
 #include "scene/import/scene_text.h"
 
 #include <string>
@@ -9,8 +10,8 @@
 namespace crt {
 
 /// `file_name` is what the scene calls the file, `folder` where the scene is. Everything that is not in the
-/// scene as it is in the file goes to `losses`.
+/// scene as it is in the file goes to `losses`. Throws crt::Error(Usage) for a variant that the file lacks.
 std::string gltfScene(GltfFile& file, const std::string& file_name, const std::string& folder,
-                      bool allow_outside, Losses& losses);
+                      const ImportOptions& options, Losses& losses);
 
 }  // namespace crt

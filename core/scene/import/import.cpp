@@ -7,6 +7,7 @@
 #include "scene/import/gltf_import.h"
 #include "scene/import/mesh_import.h"
 #include "scene/mesh/ply_reader.h"
+#include "scene/mesh/stl_reader.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -64,7 +65,8 @@ std::string extensionOf(const std::string& path) {
 
 bool isModel(const std::string& path) {
     const std::string extension = extensionOf(path);
-    return extension == ".glb" || extension == ".gltf" || extension == ".obj" || extension == ".ply";
+    return extension == ".glb" || extension == ".gltf" || extension == ".obj" || extension == ".ply" ||
+           extension == ".stl";
 }
 
 std::string otherRendererOf(const std::string& path) {
@@ -80,11 +82,11 @@ std::string importHint(const std::string& path) {
 
 std::string unreadFormatOf(const std::string& path) {
     constexpr std::pair<const char*, const char*> kUnread[]{
-        {".blend", "Blender"}, {".fbx", "FBX"},       {".usd", "USD"},      {".usda", "USD"},
-        {".usdc", "USD"},      {".usdz", "USD"},      {".stl", "STL"},      {".dae", "COLLADA"},
-        {".3ds", "3ds Max"},   {".max", "3ds Max"},   {".abc", "Alembic"},  {".ma", "Maya"},
-        {".mb", "Maya"},       {".c4d", "Cinema 4D"}, {".skp", "SketchUp"}, {".3dm", "Rhino"},
-        {".step", "STEP"},     {".stp", "STEP"},      {".rad", "Radiance"}, {".lxs", "LuxCore"}};
+        {".blend", "Blender"}, {".fbx", "FBX"},      {".usd", "USD"},     {".usda", "USD"},
+        {".usdc", "USD"},      {".usdz", "USD"},     {".dae", "COLLADA"}, {".3ds", "3ds Max"},
+        {".max", "3ds Max"},   {".abc", "Alembic"},  {".ma", "Maya"},     {".mb", "Maya"},
+        {".c4d", "Cinema 4D"}, {".skp", "SketchUp"}, {".3dm", "Rhino"},   {".step", "STEP"},
+        {".stp", "STEP"},      {".rad", "Radiance"}, {".lxs", "LuxCore"}};
     const std::string extension = extensionOf(path);
     for (const auto& [end, name] : kUnread)
         if (extension == end) return name;
@@ -106,10 +108,13 @@ ImportedModel importModel(GltfFiles& files, const std::string& path, const Impor
     } else if (extensionOf(path) == ".ply") {
         mesh = visibleMesh(loadPly(path), path);
         body = plyScene(mesh->mesh, name, losses);
+    } else if (extensionOf(path) == ".stl") {
+        mesh = visibleMesh(loadStl(path), path);
+        body = stlScene(mesh->mesh, name, losses);
     } else {
         GltfFile& gltf = files.open(path);
         if (options.allow_outside) gltf.allowOutside();
-        body = gltfScene(gltf, name, folder, options.allow_outside, losses);
+        body = gltfScene(gltf, name, folder, options, losses);
         const tinygltf::Asset& asset = gltf.model().asset;
         if (!asset.generator.empty()) about += fmt::format("# Made by {}\n", inOneLine(asset.generator));
         if (!asset.copyright.empty()) about += fmt::format("# {}\n", inOneLine(asset.copyright));

@@ -1,8 +1,10 @@
-/// Models as scenes: a glTF, GLB, OBJ or PLY file → the text of a scene that shows it. The one way from
-/// such a file to a picture: `crt import` writes the text, and every command that takes a scene reads it.
+/// Models as scenes: a glTF, GLB, OBJ, PLY or STL file → the text of a scene that shows it. There is no
+/// other way from such a file to a picture: `crt import` writes the text, and every command that takes a
+/// scene reads it.
 #pragma once
 
 #include "scene/gltf/gltf_file.h"
+#include "scene/import/import_options.h"
 #include "scene/mesh/mesh_io.h"
 
 #include <memory>
@@ -12,7 +14,7 @@ namespace crt {
 
 /// With its dot, in lower case: ".obj".
 std::string extensionOf(const std::string& path);
-/// By the end of the file's name: .glb, .gltf, .obj, .ply.
+/// By the end of the file's name: .glb, .gltf, .obj, .ply, .stl.
 bool isModel(const std::string& path);
 /// "Mitsuba" or "pbrt", by the end of the name of a scene of theirs; empty: it is none. crt's Python package
 /// imports them.
@@ -22,14 +24,9 @@ std::string importHint(const std::string& path);
 /// "Blender": what has files with this end that crt does not read, as far as they are known; else empty.
 std::string unreadFormatOf(const std::string& path);
 
-struct ImportOptions {
-    std::string folder;          ///< Of the scene: names of files are relative to it. Empty: the file's own.
-    bool allow_outside = false;  ///< Buffers and images may lie outside the file's folder.
-};
-
 struct ImportedModel {
     std::string scene;                 ///< Its text.
-    std::unique_ptr<LoadedMesh> mesh;  ///< For an OBJ or PLY: hints for the reader of the scene.
+    std::unique_ptr<LoadedMesh> mesh;  ///< For an OBJ, PLY or STL: hints for the reader of the scene.
 };
 
 /// The text of a scene of the model, with a camera and light where it has none. One warning reports

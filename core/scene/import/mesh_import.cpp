@@ -115,4 +115,15 @@ std::string plyScene(const Mesh& mesh, const std::string& file_name, Losses& los
     return text + "    normals: smooth  # the file has none\n";
 }
 
+/// Grey, and smooth but for edges: a machined part.
+std::string stlScene(const Mesh& mesh, const std::string& file_name, Losses& losses) {
+    losses.choose("a grey material, and smooth normals but at edges of more than 30 degrees");
+    return viewText(mesh, std::nullopt, losses) +
+           fmt::format(
+               "\nmaterials:\n  surface: {{type: diffuse, reflectance: 0.5}}\n\nobjects:\n  - name: "
+               "{0}\n    stl: {0}\n    material: surface\n    normals: smooth\n    "
+               "crease_angle_deg: 30\n",
+               yamlText(file_name));
+}
+
 }  // namespace crt

@@ -11,5 +11,6 @@ namespace crt {
 /// `file_name` is what the scene calls the file.
 std::string objScene(const LoadedMesh& loaded, const std::string& file_name, Losses& losses);
 std::string plyScene(const Mesh& mesh, const std::string& file_name, Losses& losses);
+std::string stlScene(const Mesh& mesh, const std::string& file_name, Losses& losses);
 
 }  // namespace crt

@@ -122,6 +122,7 @@ void MeshReader::checkTextures(const SectionReader& section, const Object& objec
     const std::string_view named = section.has("material") ? "material"
                                    : section.has("obj")    ? "obj"
                                    : section.has("ply")    ? "ply"
+                                   : section.has("stl")    ? "stl"
                                                            : "mesh";
     for (const std::int32_t index : materials) {
         const Material& material = scene_.materials[static_cast<std::size_t>(index)];

@@ -1,11 +1,12 @@
-/// The part of MeshReader that reads objects with `obj` or `ply`: which of their materials are the file's,
-/// and which the scene's.
+/// The part of MeshReader that reads objects with `obj`, `ply` or `stl`: which of their materials are the
+/// file's, and which the scene's.
 #include "scene/yaml/scene_meshes.h"
 
 #include "base/log.h"
 #include "base/stage.h"
 #include "scene/mesh/obj_text.h"
 #include "scene/mesh/ply_reader.h"
+#include "scene/mesh/stl_reader.h"
 #include "scene/mesh/vertex_normals.h"
 
 #include <fmt/format.h>
@@ -19,15 +20,19 @@ namespace crt {
 /// out.
 MeshReader::MeshUse MeshReader::readMeshUse(const SectionReader& object, const std::string& material) {
     MeshUse use;
-    use.file.ply = object.has("ply");
+    use.file.format = object.has("ply")   ? MeshFormat::Ply
+                      : object.has("stl") ? MeshFormat::Stl
+                                          : MeshFormat::Obj;
     use.file.normals = readNormals(object);
-    if (use.file.ply) {
-        refuseObjKeys(object);
+    if (use.file.format == MeshFormat::Ply)
         object.readEnum("vertex_colors", use.file.colors);
+    else if (object.has("vertex_colors"))
+        object.error("vertex_colors", "this key needs colours from a PLY");
+    if (use.file.format != MeshFormat::Obj) {
+        refuseObjKeys(object);
         use.material = material;
         return use;
     }
-    if (object.has("vertex_colors")) object.error("vertex_colors", "this key needs colours from a PLY");
     use.parts = readMeshParts(object);
     if (material != "from_mtl") use.material = material;
     if (const std::optional<SectionReader> mtl =
@@ -86,28 +91,35 @@ std::unique_ptr<LoadedMesh> MeshReader::takeOffered(const FileUse& use) {
     return taken ? std::move(offered_) : nullptr;
 }
 
+LoadedMesh MeshReader::read(const FileUse& use) {
+    switch (use.format) {
+        case MeshFormat::Ply: return loadPly(use.path, PlyOptions{use.colors});
+        case MeshFormat::Stl: return loadStl(use.path);
+        case MeshFormat::Obj: break;
+    }
+    return loadObj(use.path, use.obj);
+}
+
 LoadedMesh* MeshReader::load(const SectionReader& object, const FileUse& use) {
     const auto [file, fresh] = loaded_.try_emplace(use);
     if (fresh) {
         try {
             file->second = takeOffered(use);
-            if (!file->second)
-                file->second = std::make_unique<LoadedMesh>(
-                    use.ply ? loadPly(use.path, PlyOptions{use.colors}) : loadObj(use.path, use.obj));
+            if (!file->second) file->second = std::make_unique<LoadedMesh>(read(use));
             for (const std::string& read : file->second->files) files_.note(read);
             addMaps(*file->second, use.path);
             setNormals(file->second->mesh, use.normals, std::filesystem::path(use.path).filename().string());
         } catch (const Error& e) {
             if (e.kind() == ErrorKind::Internal) throw;
             file->second = nullptr;
-            object.error(use.ply ? "ply" : "obj", sentenceWithPlace(e));
+            object.error(keyOf(use.format), sentenceWithPlace(e));
         }
     }
     return file->second.get();
 }
 
 std::optional<std::uint32_t> MeshReader::readMeshFile(const SectionReader& object, MeshUse use) {
-    const std::string_view key = use.file.ply ? "ply" : "obj";
+    const std::string_view key = keyOf(use.file.format);
     std::string name;
     if (!object.read(key, name)) return std::nullopt;
     const std::optional<std::string> path = files_.locate(name, object.place(key), out_);
@@ -190,7 +202,7 @@ Mesh MeshReader::withSceneMaterials(LoadedMesh& loaded, std::uint32_t mesh_numbe
 /// Every face must have a material: one of the OBJ's, or that of the object.
 void MeshReader::checkMaterials(const SectionReader& object, const LoadedMesh& loaded, const Mesh& mesh,
                                   const MeshUse& use) const {
-    if (use.file.ply) return;  // That of the object, which must be there.
+    if (use.file.format != MeshFormat::Obj) return;  // That of the object, which must be there.
     const std::size_t triangles = mesh.triangles.size();
     const auto bare = mesh.material.empty() ? static_cast<std::ptrdiff_t>(triangles)
                                             : std::count_if(mesh.material.begin(), mesh.material.end(),

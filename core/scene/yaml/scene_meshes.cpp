@@ -41,7 +41,7 @@ void SceneRoom::require(const YamlPlace& place, Diagnostics& out) const {
 
 std::optional<std::uint32_t> MeshReader::read(const SectionReader& section,
                                               const std::string& material_name, Object& object) {
-    if ((section.has("obj") || section.has("ply")) && !section.has("mesh"))
+    if ((section.has("obj") || section.has("ply") || section.has("stl")) && !section.has("mesh"))
         return readMeshFile(section, readMeshUse(section, material_name));
     if (section.has("gltf")) return readGltf(section);
     if (hasShape(section)) {

@@ -61,10 +61,12 @@ private:
         auto operator<=>(const NormalsUse&) const = default;
     };
 
+    enum class MeshFormat { Obj, Ply, Stl };
+
     /// A file of a mesh, and how it is read.
     struct FileUse {
         std::string path;
-        bool ply = false;
+        MeshFormat format = MeshFormat::Obj;
         ObjOptions obj;                      ///< Of an OBJ.
         PlyColor colors = PlyColor::ByType;  ///< Of a PLY.
         NormalsUse normals;
@@ -88,6 +90,10 @@ private:
     LoadedMesh* load(const SectionReader& object, const FileUse& use);
     std::unique_ptr<LoadedMesh> takeOffered(const FileUse& use);
     std::optional<std::uint32_t> readMeshFile(const SectionReader& object, MeshUse use);
+    static LoadedMesh read(const FileUse& use);
+    static std::string_view keyOf(MeshFormat format) {
+        return format == MeshFormat::Ply ? "ply" : format == MeshFormat::Stl ? "stl" : "obj";
+    }
     static bool hasShape(const SectionReader& object);
     std::optional<std::uint32_t> readShape(const SectionReader& section, Object& object);
     Mesh takeMesh(LoadedMesh& loaded, std::uint32_t number);

@@ -820,112 +820,111 @@ void addShapes(std::vector<SectionSchema>& all) {
 }
 
 void addObjects(std::vector<SectionSchema>& all) {
-    all.push_back({"object",
-                   "an object",
-                   "A mesh or a shape, placed once or many times. Give one of `obj`, `ply`, `gltf`, `mesh`, "
-                   "`sphere`, `disk`, `cylinder`, `rectangle` and `box`; `transform` or `transforms`.",
-                   {
-                       {.name = "name", .doc = "For messages and reports."},
-                       {.name = "obj",
-                        .doc = "A Wavefront OBJ file, looked up in the scene's folder, then in "
-                               "CRT_MESH_PATH."},
-                       {.name = "gltf",
-                        .kind = Kind::Section,
-                        .section = "gltf",
-                        .doc = "Or a primitive of a glTF file or GLB; `crt import` writes scenes of them."},
-                       {.name = "ply",
-                        .doc = "Or a PLY file, ascii or binary, looked up in the same places: positions and "
-                               "faces; normals (`nx`, `ny`, `nz`), texture coordinates (`u`, `v`; `s`, `t`; "
-                               "`texture_u`, `texture_v`; or `texcoord` of faces) and colours (`red`, "
-                               "`green`, `blue`) where it has them. One line says what was left out."},
-                       {.name = "mesh",
-                        .kind = Kind::Section,
-                        .section = "mesh",
-                        .doc = "Or the geometry written out."},
-                       {.name = "sphere",
-                        .kind = Kind::Section,
-                        .section = "sphere",
-                        .doc = "Or a sphere, or a part of one: a lens is made of two and a cylinder."},
-                       {.name = "disk", .kind = Kind::Section, .section = "disk", .doc = "Or a disk."},
-                       {.name = "cylinder",
-                        .kind = Kind::Section,
-                        .section = "cylinder",
-                        .doc = "Or a cylinder."},
-                       {.name = "rectangle",
-                        .kind = Kind::Section,
-                        .section = "rectangle",
-                        .doc = "Or a rectangle."},
-                       {.name = "box", .kind = Kind::Section, .section = "box", .doc = "Or a box."},
-                       {.name = "material",
-                        .doc = "A name in `materials`. An OBJ's faces get it where its own materials "
-                               "(usemtl, MTL) give them none; left "
-                               "out, or `from_mtl`, each face must have its own."},
-                       {.name = "override",
-                        .kind = Kind::Boolean,
-                        .fallback = "false",
-                        .doc = "Use `material` for all faces of the OBJ; its own materials are not read."},
-                       {.name = "parts",
-                        .kind = Kind::Section,
-                        .shape = Shape::Map,
-                        .section = "part",
-                        .doc = "Materials and emission for parts of the OBJ, by the names that it gives to "
-                               "faces: groups (`g`), objects (`o`) and materials (`usemtl`, also those that "
-                               "no MTL defines). In a name `*` stands for any letters and `?` for one. If "
-                               "several parts match a face, its material comes from the last of them that "
-                               "has one, and so does its emission: write the general part before the "
-                               "special one. A name that matches no face is an error."},
-                       {.name = "mtl",
-                        .kind = Kind::Section,
-                        .section = "mtl",
-                        .doc = "Options for reading the MTL of the OBJ."},
-                       {.name = "vertex_colors",
-                        .kind = Kind::Choice,
-                        .choices = {"srgb", "linear"},
-                        .doc = "Encoding of the colours in the PLY, for `{attribute: colors}`. By default "
-                               "integers are sRGB-encoded and floats linear."},
-                       {.name = "normals",
-                        .kind = Kind::Choice,
-                        .choices = {"file", "smooth", "flat"},
-                        .fallback = "file",
-                        .doc = "For shading. `file`: those of the file or mesh; faces without normals are "
-                               "flat. `smooth`: computed, at each vertex the mean of the faces around it, "
-                               "weighted by their angles there (Thürmer and Wüthrich 1998); vertices at "
-                               "the same place count as one. `flat`: none."},
-                       {.name = "crease_angle_deg",
-                        .kind = Kind::Number,
-                        .range = {.min = 0, .max = 180},
-                        .unit = "degrees",
-                        .fallback = "60",
-                        .doc = "For `normals: smooth`: the largest angle between two faces at their common "
-                               "edge that are shaded as one surface. An edge beyond which the surface is "
-                               "inside out is a crease, too."},
-                       {.name = "transform",
-                        .kind = Kind::Section,
-                        .shape = Shape::List,
-                        .section = "transform",
-                        .fallback = "[]",
-                        .doc = "One placement: steps applied in order, the first one first."},
-                       {.name = "share",
-                        .kind = Kind::Choice,
-                        .choices = {"auto", "always", "never"},
-                        .fallback = "auto",
-                        .doc = "`always`: all placements share one copy of the mesh. This saves memory and "
-                               "makes rays slower. `auto`: they share it if the object would otherwise have "
-                               "more than 4 million triangles. `never`: each placement has its own copy. "
-                               "Surfaces that emit, and places that flatten the mesh, never share."},
-                       {.name = "transforms",
-                        .kind = Kind::Section,
-                        .shape = Shape::Lists,
-                        .section = "transform",
-                        .doc = "Several placements; the mesh is stored once."},
-                       {.name = "emission",
-                        .kind = Kind::Section,
-                        .section = "emission",
-                        .doc = "Makes the surface a light."},
-                   },
-                   {{KeyRule::Kind::ExactlyOne,
-                     {"obj", "ply", "gltf", "mesh", "sphere", "disk", "cylinder", "rectangle", "box"}},
-                    {KeyRule::Kind::AtMostOne, {"transform", "transforms"}}}});
+    all.push_back(
+        {"object",
+         "an object",
+         "A mesh or a shape, placed once or many times. Give one of `obj`, `ply`, `stl`, `gltf`, `mesh`, "
+         "`sphere`, `disk`, `cylinder`, `rectangle` and `box`; `transform` or `transforms`.",
+         {
+             {.name = "name", .doc = "For messages and reports."},
+             {.name = "obj",
+              .doc = "A Wavefront OBJ file, looked up in the scene's folder, then in "
+                     "CRT_MESH_PATH."},
+             {.name = "gltf",
+              .kind = Kind::Section,
+              .section = "gltf",
+              .doc = "Or a primitive of a glTF file or GLB; `crt import` writes scenes of them."},
+             {.name = "ply",
+              .doc = "Or a PLY file, ascii or binary, looked up in the same places: positions and "
+                     "faces; normals (`nx`, `ny`, `nz`), texture coordinates (`u`, `v`; `s`, `t`; "
+                     "`texture_u`, `texture_v`; or `texcoord` of faces) and colours (`red`, "
+                     "`green`, `blue`) where it has them. One line says what was left out."},
+             {.name = "stl",
+              .doc = "Or an STL file, ascii or binary, looked up in the same places: triangles "
+                     "alone. With `normals: smooth` and a `crease_angle_deg` curved parts are "
+                     "smooth."},
+             {.name = "mesh",
+              .kind = Kind::Section,
+              .section = "mesh",
+              .doc = "Or the geometry written out."},
+             {.name = "sphere",
+              .kind = Kind::Section,
+              .section = "sphere",
+              .doc = "Or a sphere, or a part of one: a lens is made of two and a cylinder."},
+             {.name = "disk", .kind = Kind::Section, .section = "disk", .doc = "Or a disk."},
+             {.name = "cylinder", .kind = Kind::Section, .section = "cylinder", .doc = "Or a cylinder."},
+             {.name = "rectangle", .kind = Kind::Section, .section = "rectangle", .doc = "Or a rectangle."},
+             {.name = "box", .kind = Kind::Section, .section = "box", .doc = "Or a box."},
+             {.name = "material",
+              .doc = "A name in `materials`. An OBJ's faces get it where its own materials "
+                     "(usemtl, MTL) give them none; left "
+                     "out, or `from_mtl`, each face must have its own."},
+             {.name = "override",
+              .kind = Kind::Boolean,
+              .fallback = "false",
+              .doc = "Use `material` for all faces of the OBJ; its own materials are not read."},
+             {.name = "parts",
+              .kind = Kind::Section,
+              .shape = Shape::Map,
+              .section = "part",
+              .doc = "Materials and emission for parts of the OBJ, by the names that it gives to "
+                     "faces: groups (`g`), objects (`o`) and materials (`usemtl`, also those that "
+                     "no MTL defines). In a name `*` stands for any letters and `?` for one. If "
+                     "several parts match a face, its material comes from the last of them that "
+                     "has one, and so does its emission: write the general part before the "
+                     "special one. A name that matches no face is an error."},
+             {.name = "mtl",
+              .kind = Kind::Section,
+              .section = "mtl",
+              .doc = "Options for reading the MTL of the OBJ."},
+             {.name = "vertex_colors",
+              .kind = Kind::Choice,
+              .choices = {"srgb", "linear"},
+              .doc = "Encoding of the colours in the PLY, for `{attribute: colors}`. By default "
+                     "integers are sRGB-encoded and floats linear."},
+             {.name = "normals",
+              .kind = Kind::Choice,
+              .choices = {"file", "smooth", "flat"},
+              .fallback = "file",
+              .doc = "For shading. `file`: those of the file or mesh; faces without normals are "
+                     "flat. `smooth`: computed, at each vertex the mean of the faces around it, "
+                     "weighted by their angles there (Thürmer and Wüthrich 1998); vertices at "
+                     "the same place count as one. `flat`: none."},
+             {.name = "crease_angle_deg",
+              .kind = Kind::Number,
+              .range = {.min = 0, .max = 180},
+              .unit = "degrees",
+              .fallback = "60",
+              .doc = "For `normals: smooth`: the largest angle between two faces at their common "
+                     "edge that are shaded as one surface. An edge beyond which the surface is "
+                     "inside out is a crease, too."},
+             {.name = "transform",
+              .kind = Kind::Section,
+              .shape = Shape::List,
+              .section = "transform",
+              .fallback = "[]",
+              .doc = "One placement: steps applied in order, the first one first."},
+             {.name = "share",
+              .kind = Kind::Choice,
+              .choices = {"auto", "always", "never"},
+              .fallback = "auto",
+              .doc = "`always`: all placements share one copy of the mesh. This saves memory and "
+                     "makes rays slower. `auto`: they share it if the object would otherwise have "
+                     "more than 4 million triangles. `never`: each placement has its own copy. "
+                     "Surfaces that emit, and places that flatten the mesh, never share."},
+             {.name = "transforms",
+              .kind = Kind::Section,
+              .shape = Shape::Lists,
+              .section = "transform",
+              .doc = "Several placements; the mesh is stored once."},
+             {.name = "emission",
+              .kind = Kind::Section,
+              .section = "emission",
+              .doc = "Makes the surface a light."},
+         },
+         {{KeyRule::Kind::ExactlyOne,
+           {"obj", "ply", "stl", "gltf", "mesh", "sphere", "disk", "cylinder", "rectangle", "box"}},
+          {KeyRule::Kind::AtMostOne, {"transform", "transforms"}}}});
     all.push_back({"part",
                    "a part",
                    "",
@@ -1148,7 +1147,7 @@ void addOutside(std::vector<SectionSchema>& all) {
                             "is replaced only with `--overwrite`. `-o` names any file."},
                     {.name = "format",
                      .kind = Kind::Choice,
-                     .choices = {"exr", "png", "ppm", "pfm"},
+                     .choices = {"exr", "png", "jpeg", "ppm", "pfm"},
                      .doc = "The default follows from the extension of `file`."},
                     {.name = "aovs",
                      .kind = Kind::Choice,

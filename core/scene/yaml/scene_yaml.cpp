@@ -1,5 +1,6 @@
 // Over 450 lines: the top of a scene, its settings, and the ways to its text.
 #include "scene/yaml/scene_yaml.h"
+#include "image/image_io.h"
 
 #include "base/input_file.h"
 #include "base/log.h"
@@ -180,20 +181,17 @@ void readOutput(const SectionReader& section, std::vector<Output>& outputs) {
 
     bool format_known = section.readEnum("format", output.format);
     if (named && !section.has("format")) {
-        const std::vector<std::string>& formats = section.schema().find("format")->choices;
-        std::string extension = std::filesystem::path(output.file).extension().string();
-        if (!extension.empty()) extension.erase(0, 1);
-        for (char& c : extension)
-            if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-        const auto found = std::find(formats.begin(), formats.end(), extension);
-        format_known = found != formats.end();
-        if (format_known)
-            output.format = static_cast<OutputFormat>(found - formats.begin());
-        else
+        const std::optional<OutputFormat> format = formatOfFile(output.file);
+        format_known = format.has_value();
+        if (format_known) {
+            output.format = *format;
+        } else {
+            std::string extension = std::filesystem::path(output.file).extension().string();
+            if (!extension.empty()) extension.erase(0, 1);
             section.error("file",
-                          fmt::format("'{}' does not end in one of .{}; add 'format'", output.file,
-                                      fmt::join(formats, ", .")),
-                          didYouMean(extension, formats));
+                          fmt::format("'{}' does not end in {}; add 'format'", output.file, kImageEnds),
+                          didYouMean(extension, section.schema().find("format")->choices));
+        }
     }
 
     if (const YamlNode* list = section.list("aovs")) {
@@ -337,8 +335,8 @@ Scene loadScene(const std::string& path, const std::vector<SceneOverride>& overr
                     {path});
     if (const std::string format = unreadFormatOf(path); !format.empty() && std::filesystem::exists(path))
         throw Error(ErrorKind::Scene,
-                    fmt::format("{}: error: this is a file of {}, and crt reads .yaml, .glb, .gltf, .obj "
-                                "and .ply; export it as .glb or .obj",
+                    fmt::format("{}: error: this is a file of {}, and crt reads .yaml, .glb, .gltf, .obj, "
+                                ".ply and .stl; export it as .glb or .obj",
                                 path, format),
                     {path});
     const std::string text = readSceneText(path);
