@@ -12,8 +12,8 @@ namespace {
 
 constexpr const char* kDenoiseNotes = R"(
 Open Image Denoise guesses the image without its noise. The guess is no measurement: it has no stated error,
-and crt marks it (`crt/denoised`) and never writes it over the film or a measured image. Films that hold the AOVs
-albedo and normal guide it: details of textures and edges stay. crt's Python package runs it.
+and crt marks it (`crt/denoised`) and never writes it over the film or a measured image. Films that hold the
+AOVs albedo and normal guide it: details of textures and edges stay. crt's Python package runs it.
 
   crt scene.yaml -o scene.exr -o scene.crtfilm
   crt denoise scene.crtfilm -o scene.denoised.exr -o scene.denoised.png
