@@ -78,6 +78,39 @@ TEST_CASE("BSDF: directions are distributed as the pdf says", "[kernel][bsdf][ma
     }
 }
 
+TEST_CASE("BSDF: seen along the surface or its normal's plane, all is finite", "[kernel][bsdf][materials]") {
+    Random random(75);
+    const auto finite = [](double x) { return std::isfinite(x) && x >= 0; };
+    const auto all_finite = [&](vec4 v) {
+        return finite(V4X(v)) && finite(V4Y(v)) && finite(V4Z(v)) && finite(V4W(v));
+    };
+    for (const Subject& s : subjects())
+        for (const double tilt : {0.0, 0.53, 1.1}) {
+            const Vec3d normal = spherical(std::cos(tilt), 0.2);
+            const Vec3d across = spherical(std::cos(tilt + kPi / 2), 0.2), along = cross(normal, across);
+            const Bench bench(s.material, normal);
+            INFO(s.name << " at " << tilt);
+            std::uint64_t wrong = 0;
+            for (int i = 0; i < 300; ++i) {
+                // In floats these are before and behind the normal in turn, by its rounding.
+                const double phi = 2 * kPi * random.pair().x;
+                Vec3d wo;
+                for (std::size_t k = 0; k < 3; ++k)
+                    wo[k] = across[k] * std::cos(phi) + along[k] * std::sin(phi);
+                const CrtBsdf bsdf = bench.prepare(wo);
+                wrong += !all_finite(bsdf.albedo);
+                const CrtScatter there = Bench::sampleSurface(bsdf, random.pair(), random.pair());
+                wrong += there.valid && !(all_finite(there.weight) && finite(there.pdf));
+                if (isDelta(bsdf)) continue;
+                const CrtRandom2 u = random.pair();
+                const vec3 w = unitFloat(spherical(2 * u.x - 1, 2 * kPi * u.y));
+                wrong += !all_finite(crt_surface_eval(&bsdf, w)) || !finite(crt_surface_pdf(&bsdf, w));
+            }
+            CHECK(wrong == 0);
+        }
+    CHECK(crt_fresnel_dielectric(0.0f, 1.0f) == 0.0f);  // even then there is no surface
+}
+
 TEST_CASE("BSDF: about interpolated normals nothing that is reflected is lost",
           "[kernel][bsdf][materials]") {
     Random random(74);

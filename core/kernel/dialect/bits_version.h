@@ -19,10 +19,11 @@
  *   10  a table has the mean reflectance of a film on a rough metal
  *   11  Sobol points of two dimensions are stratified together
  *   12  rounding does not make a small light block the rays towards it
+ *   13  a coat of index 1 reflects nothing, also at the horizon
  */
 #ifndef CRT_BITS_VERSION_H
 #define CRT_BITS_VERSION_H
 
-#define CRT_BITS_VERSION 12u
+#define CRT_BITS_VERSION 13u
 
 #endif

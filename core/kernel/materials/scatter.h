@@ -111,6 +111,7 @@ CRT_FN f32 crt_refraction(f32 cos_i, f32 eta) { return (eta - 1.0f) * (eta + 1.0
    in total internal reflection, exactly 0 for an index of 1. */
 CRT_FN f32 crt_fresnel_of(f32 cos_i, f32 eta) {
     const f32 refraction = crt_refraction(cos_i, eta);
+    if (eta == 1.0f) return 0.0f; /* also where a grazing cosine is rounded to 0 or below */
     if (!(refraction > 0.0f)) return 1.0f;
     const f32 cos_t = crt_sqrt(refraction) / eta;
     const f32 rs = (cos_i - eta * cos_t) / (cos_i + eta * cos_t);
