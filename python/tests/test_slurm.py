@@ -122,7 +122,7 @@ def test_merge_says_what_is_missing(folder):
     (["bad.yaml", "--nodes", 2], 3, "bad.yaml:3:"),
     (["my box.yaml"], 2, "--nodes"),
     (["my box.yaml", "--nodes", 0], 2, "1 or more"),
-    (["my box.yaml", "--nodes", 2, "-o", "a.jpg"], 2, "not '"),
+    (["my box.yaml", "--nodes", 2, "-o", "a.gif"], 2, "not '"),
     (["my box.yaml", "--nodes", 2, "-o", "no/a.exr"], 6, "there is no folder"),
     (["my box.yaml", "--nodes", 2, "--set", "film.resolutio=[2,2]"], 3, "did you mean 'resolution'"),
     (["my box.yaml", "--nodes", 2, "--checkpoint-every", "never"], 2, "--checkpoint-every takes a duration"),

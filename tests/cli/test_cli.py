@@ -86,7 +86,7 @@ class WrongCommandLine(CliTest):
             ("--seed", "1.5"),
             ("--set", "film.resolution"),
             ("--checkpoint-every", "0s"),
-            ("-o", "image.jpeg"),
+            ("-o", "image.gif"),
         ):
             with self.subTest(option=option, value=value):
                 run = self.crt(

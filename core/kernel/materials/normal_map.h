@@ -92,7 +92,8 @@ CRT_FN vec3 crt_base(const CrtBsdf *b) { return crt_is_facet(b) ? b->base : b->n
 /* Cosine of a scattered direction with the base; or, where that is below it, less the one with the side. */
 CRT_FN f32 crt_scatter_cosine(const CrtBsdf *b, vec3 wi) {
     const f32 cosine = dot3(wi, crt_base(b));
-    if (!CRT_HAS(SMOOTH_NORMALS) || (!CRT_HAS(TRANSLUCENT) && cosine > 0.0f)) return cosine;
+    if (!CRT_HAS(SMOOTH_NORMALS)) return cosine;
+    if (!CRT_HAS(TRANSLUCENT) && cosine > 0.0f) return cosine;
     const f32 above = dot3(wi, crt_side(b));
     if (CRT_HAS(TRANSLUCENT) && cosine > 0.0f) return crt_is_translucent(b) && above < 0.0f ? above : cosine;
     return above > 0.0f ? -above : cosine;
