@@ -69,9 +69,11 @@ class Names(CliTest):
         self.assert_one_error(run, "backends are", "cuda", "embree", "opencl", "fake")
 
     def test_files_of_other_programs(self):
-        for name, program in (("a.blend", "Blender"), ("a.FBX", "FBX"), ("a.usdz", "USD"), ("a.dae", "COLLADA")):
+        programs = {"a.blend": "Blender", "a.FBX": "FBX", "a.usdz": "USD", "a.dae": "COLLADA"}
+        read = ".yaml, .glb, .gltf, .obj, .ply and .stl"
+        for name, program in programs.items():
             self.write(name, "")
-            self.assert_one_error(self.crt(name, expect=3), program, ".yaml, .glb, .gltf, .obj, .ply and .stl")
+            self.assert_one_error(self.crt(name, expect=3), program, read)
 
     def test_a_folder_that_takes_no_files(self):
         run = self.crt("scene.yaml", "-b", "fake", "-o", "/proc/x.png", expect=6)
