@@ -48,9 +48,8 @@ int import(const Request& request) {
         throw Error(ErrorKind::Usage, fmt::format("'{}' is a {} scene; {}", request.model, other,
                                                   importHint(request.model)));
     if (!isModel(request.model))
-        throw Error(
-            ErrorKind::Usage,
-            fmt::format("crt cannot import '{}': it reads .glb, .gltf, .obj, .ply and .stl", request.model));
+        throw Error(ErrorKind::Usage,
+                    fmt::format("crt cannot import '{}': it reads {}", request.model, kModelEnds));
     const bool to_file = !request.output.empty() && request.output != "-";
     ImportOptions options;
     options.allow_outside = request.allow_outside;

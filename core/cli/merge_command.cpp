@@ -93,8 +93,7 @@ Command mergeCommand() {
         .groups = {{"Options",
                     {{.names = "-o,--output",
                       .placeholder = "FILE",
-                      .help =
-                          ".crtfilm, or an image (.exr .png .jpg .ppm .pfm); -.png for a pipe; repeatable",
+                      .help = ".crtfilm or an image: .exr .png .jpg .ppm .pfm; -.png for a pipe; repeatable",
                       .read = [to](const std::string& text) { to->outputs.push_back(text); },
                       .completion = completeOutput(),
                       .repeatable = true,

@@ -62,45 +62,42 @@ OptionGroup where(Job& job) {
 }
 
 OptionGroup files(Job& job) {
-    return {
-        "Files",
-        {{.names = "-o,--output",
-          .placeholder = "FILE",
-          .help = ".exr .png .jpg .ppm .pfm .crtfilm, instead of the scene's; -.png for a pipe; repeatable",
-          .read = [&job](const std::string& text) { job.outputs.push_back(text); },
-          .completion = completeOutput(),
-          .repeatable = true},
-         exposeOption(job.expose_automatically),
-         {.names = "--checkpoint",
-          .placeholder = "FILE",
-          .help = "save the samples regularly and at the end, for --resume; or off",
-          .read = [&job](const std::string& text) { job.checkpoint_file = text == "off" ? "" : text; },
-          .completion = completeFilm()},
-         {.names = "--checkpoint-every",
-          .placeholder = "DURATION",
-          .help = "interval between checkpoints (10m)",
-          .read =
-              [&job](const std::string& text) {
+    return {"Files",
+            {{.names = "-o,--output",
+              .placeholder = "FILE",
+              .help = ".exr .png .jpg .ppm .pfm .crtfilm, not the scene's; -.png for a pipe; repeatable",
+              .read = [&job](const std::string& text) { job.outputs.push_back(text); },
+              .completion = completeOutput(),
+              .repeatable = true},
+             exposeOption(job.expose_automatically),
+             {.names = "--checkpoint",
+              .placeholder = "FILE",
+              .help = "save the samples regularly and at the end, for --resume; or off",
+              .read = [&job](const std::string& text) { job.checkpoint_file = text == "off" ? "" : text; },
+              .completion = completeFilm()},
+             {.names = "--checkpoint-every",
+              .placeholder = "DURATION",
+              .help = "interval between checkpoints (10m)",
+              .read = [&job](const std::string& text) {
                   job.checkpoint_interval_seconds = parseDuration(text, "--checkpoint-every");
               }},
-         {.names = "--resume",
-          .placeholder = "[FILE]",
-          .help = "continue from a checkpoint (FILE.crtfilm, or the first output's), and keep it",
-          .read =
-              [&job](const std::string& text) {
+             {.names = "--resume",
+              .placeholder = "[FILE]",
+              .help = "continue from a checkpoint (FILE.crtfilm, or the first output's), and keep it",
+              .read = [&job](const std::string& text) {
                   job.resume = true;
                   job.resume_file = text == "auto" ? "" : text;
               },
-          .completion = completeFilm()},
-         {.names = "--overwrite",
-          .placeholder = {},
-          .help = "replace a film even if it holds more samples than this run makes",
-          .read = [&job](const std::string&) { job.overwrite = true; }},
-         {.names = "--report",
-          .placeholder = "FILE",
-          .help = "write a JSON report of the run (default: first output with .report.json); or none",
-          .read = [&job](const std::string& text) { job.report_file = text == "none" ? "" : text; },
-          .completion = completeFile({"json"})}}};
+              .completion = completeFilm()},
+             {.names = "--overwrite",
+              .placeholder = {},
+              .help = "replace a film even if it holds more samples than this run makes",
+              .read = [&job](const std::string&) { job.overwrite = true; }},
+             {.names = "--report",
+              .placeholder = "FILE",
+              .help = "write a JSON report of the run (default: first output with .report.json); or none",
+              .read = [&job](const std::string& text) { job.report_file = text == "none" ? "" : text; },
+              .completion = completeFile({"json"})}}};
 }
 
 }  // namespace

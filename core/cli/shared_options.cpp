@@ -118,8 +118,8 @@ Option quietOption(const char* help) {
 Completion completeScene() {
     return completeFile({"yaml", "yml", "glb", "gltf", "obj", "ply", "stl", "xml", "pbrt"});
 }
-Completion completeImage() { return completeFile({"exr", "png", "ppm", "pfm"}); }
+Completion completeImage() { return completeFile({"exr", "png", "jpg", "ppm", "pfm"}); }
 Completion completeFilm() { return completeFile({"crtfilm"}); }
-Completion completeOutput() { return completeFile({"exr", "png", "ppm", "pfm", "crtfilm"}); }
+Completion completeOutput() { return completeFile({"exr", "png", "jpg", "ppm", "pfm", "crtfilm"}); }
 
 }  // namespace crt

@@ -300,7 +300,7 @@ class Developing(CliTest):
 
     def test_every_file_is_that_of_a_render_with_these_settings(self):
         self.render_film()
-        files = [".exr", ".png", ".pfm", ".ppm"]
+        files = [".exr", ".png", ".jpg", ".pfm", ".ppm"]
         for changes in (
             [],
             ["film.exposure_ev=1.3"],

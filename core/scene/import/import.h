@@ -14,7 +14,9 @@ namespace crt {
 
 /// With its dot, in lower case: ".obj".
 std::string extensionOf(const std::string& path);
-/// By the end of the file's name: .glb, .gltf, .obj, .ply, .stl.
+/// The ends of the names of models, for messages.
+inline constexpr const char* kModelEnds = ".glb, .gltf, .obj, .ply and .stl";
+/// By the end of the file's name, one of kModelEnds.
 bool isModel(const std::string& path);
 /// "Mitsuba" or "pbrt", by the end of the name of a scene of theirs; empty: it is none. crt's Python package
 /// imports them.

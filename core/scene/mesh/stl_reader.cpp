@@ -83,7 +83,7 @@ private:
     std::uint64_t triangles_ = 0, not_finite_ = 0;
 };
 
-/// The number of triangles that a binary file says; of fewer bytes than that takes it is none.
+/// The number of triangles that the header of a binary file says. The content has at least a header.
 std::uint64_t countIn(std::string_view content) {
     std::uint32_t count = 0;
     std::memcpy(&count, content.data() + kHeaderBytes, sizeof count);  // little-endian

@@ -335,9 +335,9 @@ Scene loadScene(const std::string& path, const std::vector<SceneOverride>& overr
                     {path});
     if (const std::string format = unreadFormatOf(path); !format.empty() && std::filesystem::exists(path))
         throw Error(ErrorKind::Scene,
-                    fmt::format("{}: error: this is a file of {}, and crt reads .yaml, .glb, .gltf, .obj, "
-                                ".ply and .stl; export it as .glb or .obj",
-                                path, format),
+                    fmt::format("{}: error: this is a file of {}, and crt reads .yaml, {}; export it as "
+                                ".glb or .obj",
+                                path, format, kModelEnds),
                     {path});
     const std::string text = readSceneText(path);
     SceneFiles files(std::filesystem::path(path).parent_path().string());

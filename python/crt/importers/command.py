@@ -14,7 +14,7 @@ MODELS = (".glb", ".gltf", ".obj", ".ply", ".stl")  # These go to the program.
 def parser():
     made = argparse.ArgumentParser(
         prog="crt import", description="convert a scene of another program",
-        epilog="Models (.glb, .gltf, .obj, .ply, .stl) go to the program crt: crt import MODEL --help.")
+        epilog=f"Models ({', '.join(MODELS)}) go to the program crt: crt import MODEL --help.")
     made.add_argument("scene", metavar="SCENE",
                       help="a scene of Mitsuba 3 (.xml) or pbrt-v4 (.pbrt, .pbrt.gz)")
     made.add_argument("-o", "--output", metavar="YAML", default="-",
