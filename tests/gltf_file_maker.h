@@ -45,6 +45,7 @@ struct GltfMaker {
 
     Json root{{"asset", {{"version", "2.0"}}}};
     std::string binary;
+    std::vector<Json> more_buffers;  ///< After the one of `binary`.
 
     int add(const char* list, const Json& item) {
         root[list].push_back(item);
@@ -84,6 +85,7 @@ struct GltfMaker {
     std::string glb() const {
         Json json = root;
         if (!binary.empty()) json["buffers"] = {{{"byteLength", binary.size()}}};
+        for (const Json& buffer : more_buffers) json["buffers"].push_back(buffer);
         std::string text = json.dump();
         text.resize((text.size() + 3) / 4 * 4, ' ');
         std::string chunks = littleEndian32(text.size()) + "JSON" + text;

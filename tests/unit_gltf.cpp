@@ -157,10 +157,10 @@ TEST_CASE("What is wrong in a glTF file is told with a JSON pointer", "[gltf]") 
     });
     pointsTo("/meshes/0/weights", set("/meshes/0/weights", 1));
     pointsTo("/asset/version", set("/asset/version", ""));
-    pointsTo("/meshes/0/primitives/0", [](GltfMaker& m) {
+    pointsTo("/meshes/0/primitives/0/extensions/KHR_draco_mesh_compression", [](GltfMaker& m) {
         primitiveOf(m)["extensions"]["KHR_draco_mesh_compression"] = {{"bufferView", 0}};
     });
-    pointsTo("/extensionsRequired/0", set("/extensionsRequired", {"EXT_meshopt_compression"}));
+    pointsTo("/extensionsRequired/0", set("/extensionsRequired", {"KHR_texture_basisu"}));
     pointsTo("/extensionsRequired/0", set("/extensionsRequired", {"VENDOR_something"}));
     pointsTo("/accessors/0/bufferView", set("/accessors/0/bufferView", 99));
     pointsTo("/accessors/0", set("/accessors/0/count", 5));

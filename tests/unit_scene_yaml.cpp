@@ -47,7 +47,7 @@ TEST_CASE("writing every default of the schema out changes nothing", "[scene_yam
     }
     for (const KeySchema& key : schemaSection("").keys)
         if (!key.fallback.empty()) text += key.name + ": " + key.fallback + "\n", ++written;
-    CHECK(written == 30);
+    CHECK(written == 31);
 
     const Scene a = parse(""), b = parse(text);
     CHECK(a.camera.position == b.camera.position);
@@ -67,6 +67,7 @@ TEST_CASE("writing every default of the schema out changes nothing", "[scene_yam
     CHECK(a.film.white_balance == b.film.white_balance);
     CHECK(a.film.exposure_ev == b.film.exposure_ev);
     CHECK(a.film.apply_to_float == b.film.apply_to_float);
+    CHECK(a.film.view == b.film.view);
     CHECK(a.integrator.type == b.integrator.type);
     CHECK(a.integrator.max_depth == b.integrator.max_depth);
     CHECK(a.integrator.roulette_depth == b.integrator.roulette_depth);
@@ -380,7 +381,7 @@ TEST_CASE("errors in overrides name the argument", "[scene_yaml][override][refus
           "      | film.resolutoin=[1,1]\n"
           "      |      ^~~~~~~~~~ did you mean 'resolution'?\n"
           "      = keys of film: resolution, crop, filter, color_space, "
-          "white_balance, exposure_ev, apply_to_float, spectral, responses, normalise_responses");
+          "white_balance, exposure_ev, apply_to_float, view, spectral, responses, normalise_responses");
     CHECK_THAT(refusedOverride(body, "flim.resolution=[1,1]"),
                Contains("--set flim.resolution: error: unknown key 'flim' in the scene") &&
                    Contains("did you mean 'film'?"));

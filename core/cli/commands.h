@@ -9,6 +9,7 @@ namespace crt {
 class CommandLine;
 
 Command renderCommand();
+Command sequenceCommand();
 Command viewCommand();
 Command infoCommand();
 Command importCommand();

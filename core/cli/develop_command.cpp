@@ -38,8 +38,9 @@ struct DevelopArguments {
     std::vector<std::string> aovs;           ///< Of EXR files; empty: those of the scene. "none": none.
 };
 
-constexpr std::array<const char*, 5> kDevelopmentKeys{
-    "film.exposure_ev", "film.white_balance", "film.color_space", "film.crop", "film.apply_to_float"};
+constexpr std::array<const char*, 6> kDevelopmentKeys{
+    "film.exposure_ev", "film.white_balance", "film.color_space",
+    "film.crop",        "film.apply_to_float", "film.view"};
 
 bool isSceneKey(std::string_view path) {
     const std::string_view first = path.substr(0, path.find('.'));
@@ -133,6 +134,7 @@ void applyChanges(FilmRecord& record, const DevelopArguments& arguments) {
         if (change.path == "film.white_balance") development.white = read.white;
         if (change.path == "film.color_space") development.color_space = read.color_space;
         if (change.path == "film.apply_to_float") development.apply_to_float = read.apply_to_float;
+        if (change.path == "film.view") development.view = read.view;
         if (change.path == "film.crop" && scene.film.crop[2] > 0) setWindow(record, scene.film.crop);
     }
     if (white) development.white = white;
@@ -219,6 +221,8 @@ constexpr const char* kDevelopNotes =
             "F2, F7, F11),\n"
             "                                       a spectrum such as {blackbody: 3200}, or null for none\n"
             "  film.color_space=acescg              srgb, acescg or xyz\n"
+            "  film.view=agx                        none, filmic or agx: brighter than white in PNG, JPEG "
+            "and PPM\n"
             "  film.crop=[0,0,256,256]              the same as --crop 0,0,256,256\n"
             "  film.apply_to_float=true             exposure and white balance in EXR and PFM too\n"
             "\nExamples:\n"

@@ -113,7 +113,9 @@ std::string lightsText(const Scene& scene, const CompiledScene& compiled) {
     if (scene.environment)
         add(scene.environment->image ? fmt::format("environment of {}", scene.environment->image->file)
             : scene.environment->sky ? fmt::format("CIE sky of type {}", scene.environment->sky->type)
-                                     : "constant environment");
+            : scene.environment->clear_sky
+                ? fmt::format("clear sky of turbidity {}", scene.environment->clear_sky->turbidity)
+                : "constant environment");
     return text.empty() ? "none: every image will be black" : text;
 }
 
@@ -184,9 +186,13 @@ std::string developmentText(const Development& development) {
     const char* const space = development.color_space == ColorSpace::LinearSrgb ? "linear sRGB"
                               : development.color_space == ColorSpace::AcesCg   ? "ACEScg"
                                                                                 : "XYZ";
-    return fmt::format("{}, exposure {:+g} EV, white balance {}{}", space, development.exposure_ev,
+    const std::string view =
+        development.view == ViewTransform::None
+            ? std::string()
+            : fmt::format(", view {}", kViewTransformNames[static_cast<std::size_t>(development.view)]);
+    return fmt::format("{}, exposure {:+g} EV, white balance {}{}{}", space, development.exposure_ev,
                        development.white ? "of " + whiteBalanceText(development) : "none",
-                       development.apply_to_float ? ", in files of floats too" : "");
+                       development.apply_to_float ? ", in files of floats too" : "", view);
 }
 
 void showRecord(const FilmRecord& record) {

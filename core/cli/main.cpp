@@ -19,10 +19,11 @@ int main(int argc, char** argv) {
     return crt::runMain([&] {
         crt::CommandLine line;
         for (crt::Command (*command)() :
-             {crt::renderCommand, crt::viewCommand, crt::infoCommand, crt::importCommand,
-              crt::compareCommand, crt::mergeCommand, crt::developCommand, crt::denoiseCommand,
-              crt::convergeCommand, crt::referenceCommand, crt::verifyCommand, crt::pluginsCommand,
-              crt::warmCommand, crt::dataCommand, crt::schemaCommand, crt::versionCommand})
+             {crt::renderCommand, crt::sequenceCommand, crt::viewCommand, crt::infoCommand,
+              crt::importCommand, crt::compareCommand, crt::mergeCommand, crt::developCommand,
+              crt::denoiseCommand, crt::convergeCommand, crt::referenceCommand, crt::verifyCommand,
+              crt::pluginsCommand, crt::warmCommand, crt::dataCommand, crt::schemaCommand,
+              crt::versionCommand})
             line.add(command());
         line.add(crt::helpCommand(line));
         line.add(crt::completionCommand(line));

@@ -1,5 +1,7 @@
 #include "compile/bvh_build.h"
 
+#include "base/byte_hash.h"
+#include "base/frame_cache.h"
 #include "base/parallel.h"
 #include "base/stage.h"
 #include "compile/bvh_collapse.h"
@@ -319,9 +321,7 @@ private:
     BinaryTree nodes_;
 };
 
-}  // namespace
-
-Bvh buildBvh(const std::vector<TriangleBounds>& triangles, float padding, const std::string& what) {
+Bvh build(const std::vector<TriangleBounds>& triangles, float padding, const std::string& what) {
     Stage stage(what, static_cast<double>(triangles.size()));
     for (const Way way : {Way::Improved, Way::Plain, Way::Median}) {
         Builder builder(triangles, way == Way::Median, stage);
@@ -332,6 +332,22 @@ Bvh buildBvh(const std::vector<TriangleBounds>& triangles, float padding, const 
         return {std::move(wide.nodes), std::move(wide.order), wide.depth};
     }
     return {};  // a median tree of 2^31 triangles has 31 levels
+}
+
+/// All that a tree is made of, in 128 bits.
+std::string digestOf(const std::vector<TriangleBounds>& triangles, float padding) {
+    ByteHash hash;
+    hash.add(&padding, sizeof padding);
+    hash.add(triangles.data(), triangles.size() * sizeof triangles.front());
+    return hash.digits128();
+}
+
+}  // namespace
+
+Bvh buildBvh(const std::vector<TriangleBounds>& triangles, float padding, const std::string& what) {
+    static FrameCache<std::string, Bvh> kept;
+    return *kept.of([&] { return digestOf(triangles, padding); },
+                    [&] { return build(triangles, padding, what); });
 }
 
 }  // namespace crt

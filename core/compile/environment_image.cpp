@@ -4,8 +4,8 @@
 #include "base/log.h"
 #include "base/parallel.h"
 #include "compile/distributions.h"
+#include "compile/sky_texels.h"
 #include "image/texels.h"
-#include "scene/cie_sky.h"
 #include "scene/scene_limits.h"
 #include "spectra/sigmoid.h"
 
@@ -22,8 +22,6 @@
 namespace crt {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
-
 [[noreturn]] void refuse(const SourcePlace& place, const std::string& sentence) {
     throw Error(ErrorKind::Scene, fmt::format("{}: error: {}", place.text(), sentence), place);
 }
@@ -31,7 +29,7 @@ constexpr double kPi = std::numbers::pi;
 /// Solid angle of a texel of a row, per radian of its width: cos at its upper edge less that at its lower
 /// one, without cancellation at the poles.
 double heightOf(std::size_t row, std::size_t rows) {
-    const double step = kPi / static_cast<double>(rows);
+    const double step = std::numbers::pi / static_cast<double>(rows);
     return 2 * std::sin((static_cast<double>(row) + 0.5) * step) * std::sin(step / 2);
 }
 
@@ -128,67 +126,6 @@ EnvironmentTexels texelsOf(const EnvironmentImage& image) {
     return out;
 }
 
-struct SineCosine {
-    double sine, cosine;
-};
-
-SineCosine sineCosine(double angle) { return {std::sin(angle), std::cos(angle)}; }
-
-/// The luminance of each texel over that of the zenith: a mean of four points, as the gradation is steep
-/// at the horizon and the indicatrix at the sun.
-std::vector<double> relativeLuminances(const CieSky& sky, std::size_t rows) {
-    constexpr std::array kPoints{0.5 - 0.28867513459481287, 0.5 + 0.28867513459481287};
-    const std::size_t columns = 2 * rows;
-    std::vector<SineCosine> azimuths;
-    for (std::size_t column = 0; column < columns; ++column)
-        for (const double x : kPoints)
-            azimuths.push_back(
-                sineCosine(((static_cast<double>(column) + x) / static_cast<double>(rows) - 1) * kPi));
-    const CieSkyLuminance luminance(sky.type, sky.towards_sun, sky.axes.up);
-    std::vector<double> relative(rows * columns);
-    const auto row_of_texels = [&](std::size_t row) {
-        for (const double y : kPoints) {
-            const SineCosine zenith =
-                sineCosine((static_cast<double>(row) + y) * kPi / static_cast<double>(rows));
-            for (std::size_t i = 0; i < azimuths.size(); ++i)
-                relative[row * columns + i / 2] += luminance(
-                    sky.axes.right * (zenith.sine * azimuths[i].sine) + sky.axes.up * zenith.cosine +
-                    sky.axes.ahead * (zenith.sine * azimuths[i].cosine));
-        }
-        for (std::size_t i = row * columns; i < (row + 1) * columns; ++i) relative[i] /= 4;
-    };
-    parallelFor(rows, 16, [&](std::size_t first, std::size_t end) {
-        for (std::size_t row = first; row < end; ++row) row_of_texels(row);
-    });
-    return relative;
-}
-
-EnvironmentTexels texelsOf(const CieSky& sky, const Spectrum& unit) {
-    EnvironmentTexels out;
-    out.height = static_cast<std::uint32_t>(sky.rows);
-    out.width = 2 * out.height;
-    const std::size_t count = std::size_t{out.width} * out.height;
-    out.texels.resize(count);
-    out.brightness.resize(count);
-    const Vec3d xyz = spectrumToXyz(unit);
-    const std::vector<double> relative = relativeLuminances(sky, out.height);
-    double horizontal = 0;  // ∫ cos over the upper half, of the relative luminance.
-    for (std::size_t row = 0; row < out.height; ++row) {
-        const double upper = kPi * static_cast<double>(row) / out.height,
-                     lower = kPi * static_cast<double>(row + 1) / out.height;
-        const double squares = std::pow(std::sin(lower), 2) - std::pow(std::sin(upper), 2);
-        for (std::size_t column = 0; column < out.width; ++column)
-            horizontal += relative[row * out.width + column] * (2 * kPi / out.width) * squares / 2;
-    }
-    const double scale = sky.horizontal ? sky.amount / horizontal : sky.amount;
-    for (std::size_t i = 0; i < count; ++i) {
-        // Coefficients of 0 are the constant ½.
-        out.texels[i] = {0, 0, 0, static_cast<float>(2 * relative[i] * scale)};
-        out.brightness[i] = static_cast<float>((xyz[0] + xyz[1] + xyz[2]) * relative[i] * scale);
-    }
-    return out;
-}
-
 /// Shares of 2³² by which items are chosen: where each begins.
 template <class Weights>
 void choose(const Weights& weights, std::span<kernel::u32> first) {
@@ -220,7 +157,9 @@ void fillGuide(std::span<const kernel::u32> first, kernel::u32 shift, std::span<
 
 EnvironmentTexels environmentTexels(const Environment& environment) {
     EnvironmentTexels out = environment.image ? texelsOf(*environment.image)
-                                              : texelsOf(environment.sky.value(), environment.radiance);
+                            : environment.sky
+                                ? skyTexels(*environment.sky, environment.radiance)
+                                : skyTexels(environment.clear_sky.value(), environment.radiance);
     double sum = 0;
     for (std::size_t row = 0; row < out.height; ++row) {
         double of_row = 0;
@@ -236,7 +175,9 @@ kernel::CrtSpan appendEnvironmentImage(BlobWriter& blob, const Environment& envi
     kernel::CrtEnvironmentImage image{};
     image.width = texels.width;
     image.height = texels.height;
-    const Axes& axes = environment.image ? environment.image->axes : environment.sky->axes;
+    const Axes& axes = environment.image ? environment.image->axes
+                       : environment.sky ? environment.sky->axes
+                                         : environment.clear_sky->axes;
     for (std::size_t k = 0; k < 3; ++k) {
         image.right[k] = static_cast<float>(axes.right[k]);
         image.up[k] = static_cast<float>(axes.up[k]);

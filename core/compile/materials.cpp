@@ -286,10 +286,10 @@ MaterialPart compileMaterials(const std::vector<const Material*>& materials, con
         if (hasFuzz(*material)) part.features |= CRT_FEATURE_FUZZ;
         if (hasClearcoat(*material)) part.features |= CRT_FEATURE_CLEARCOAT;
         if (material->isTinted()) part.features |= CRT_FEATURE_TINT;
-        // Its mapped normals are as interpolated ones.
-        if (material->isTranslucent())
-            part.features |= CRT_FEATURE_TRANSLUCENT |
-                             (material->normal_texture != kNoTexture ? CRT_FEATURE_SMOOTH_NORMALS : 0);
+        if (material->isTranslucent()) part.features |= CRT_FEATURE_TRANSLUCENT;
+        // Mapped normals of a sheet are as interpolated ones.
+        if (material->isTranslucent() && material->normal_texture != kNoTexture)
+            part.features |= CRT_FEATURE_SMOOTH_NORMALS;
         if (hasVaryingCoat(*material)) part.features |= CRT_FEATURE_COAT_TEXTURE;
         if (hasRoughBase(*material)) part.features |= CRT_FEATURE_ROUGH_BASE;
     }

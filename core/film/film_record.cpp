@@ -231,6 +231,14 @@ SceneTrait lightsTrait(const Scene& scene) {
             digest.add(sky->rows);
             add_axes(sky->axes);
         }
+        if (const auto& sky = scene.environment->clear_sky) {
+            for (const double x : sky->towards_sun) digest.add(x);
+            for (const double x : sky->ground_albedo) digest.add(x);
+            digest.add(sky->turbidity);
+            digest.add(sky->scale);
+            digest.add(sky->rows);
+            add_axes(sky->axes);
+        }
     }
     const auto add = [&digest](const auto& member) { digest.add(member); };
     for (const PointLight& light : scene.point_lights) visitMembers(light, add);
@@ -290,6 +298,8 @@ Json developmentJson(const Development& development) {
               {"exposure_ev", development.exposure_ev},
               {"apply_to_float", development.apply_to_float}};
     if (development.white) json["white_xyz"] = *development.white;
+    if (development.view != ViewTransform::None)
+        json["view"] = kViewTransformNames[static_cast<std::size_t>(development.view)];
     return json;
 }
 
@@ -319,6 +329,13 @@ Development developmentFrom(const Json& json) {
     development.exposure_ev = inRange(json.at("exposure_ev"), -100, 100);
     development.apply_to_float = json.at("apply_to_float").get<bool>();
     if (json.contains("white_xyz")) development.white = whiteFrom(json.at("white_xyz"));
+    if (json.contains("view")) {
+        const auto view = json.at("view").get<std::string>();
+        const auto known = std::find(kViewTransformNames.begin(), kViewTransformNames.end(), view);
+        if (known == kViewTransformNames.end())
+            throw Error(ErrorKind::Usage, fmt::format("has the unknown view transform '{}'", view));
+        development.view = static_cast<ViewTransform>(known - kViewTransformNames.begin());
+    }
     return development;
 }
 

@@ -215,6 +215,7 @@ Image resolveImage(const Film& film, const Development& development, std::uint32
     });
 
     image.chromaticities = chromaticities(space);
+    image.view = development.view;
     // The caller adds who rendered it, where and when.
     image.metadata = {{kColorInteropIdKey, spaceName(space)},
                       {"crt/spp", std::to_string(film.samples.count())},
@@ -222,6 +223,8 @@ Image resolveImage(const Film& film, const Development& development, std::uint32
                       {kExposureKey, fmt::format("{}", development.exposure_ev)},
                       {kWhiteBalanceKey, whiteBalanceText(development)},
                       {"crt/invalidSamples", std::to_string(film.invalidSamples())}};
+    if (image.view != ViewTransform::None)
+        image.metadata.emplace_back(kViewKey, kViewTransformNames[static_cast<std::size_t>(image.view)]);
     if (!film.splats.empty())
         image.metadata.emplace_back("crt/droppedSplats", std::to_string(film.droppedSplats()));
     if (spectral.bins.count > 0) {

@@ -2,6 +2,7 @@
 /// changed after the render (`crt develop`).
 #pragma once
 
+#include "image/view_transform.h"
 #include "spectra/spectra.h"
 
 #include <optional>
@@ -15,12 +16,15 @@ struct Development {
     std::optional<Vec3d> white;
     double exposure_ev = 0;       ///< Stops: values are multiplied by 2 to this power.
     bool apply_to_float = false;  ///< Files of floats get exposure and white balance too.
+    ViewTransform view = ViewTransform::None;  ///< Of display formats.
 
     /// For EXR and PFM, and for whatever is measured: radiance in the colour space, without exposure and
     /// white balance unless apply_to_float asks for them (docs/decisions/0013).
     Development forFloats() const {
-        if (apply_to_float) return *this;
-        return {color_space, std::nullopt, 0, false};
+        Development floats = *this;
+        floats.view = ViewTransform::None;
+        if (!apply_to_float) floats.white = std::nullopt, floats.exposure_ev = 0;
+        return floats;
     }
 
     bool operator==(const Development&) const = default;

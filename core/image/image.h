@@ -1,6 +1,8 @@
 /// An image in memory: named planes, as files have them.
 #pragma once
 
+#include "image/view_transform.h"
+
 #include <array>
 #include <cstdint>
 #include <optional>
@@ -33,6 +35,8 @@ struct Image {
     std::optional<std::array<double, 2>> adopted_neutral;
     /// For EXR: the luminance of the colour (1, 1, 1), of images whose pixels are radiance.
     std::optional<double> white_luminance_cd_m2;
+    /// For display formats, and not yet applied to the pixels.
+    ViewTransform view = ViewTransform::None;
 };
 
 }  // namespace crt

@@ -83,7 +83,7 @@ std::optional<ColorSpace> colorSpaceOf(const Image& image) {
 ColorConditions colorConditions(const Image& image) {
     const std::string balance = metadataValue(image, kWhiteBalanceKey);
     return {numberOf(image, kExposureKey), balance.empty() ? std::nullopt : std::optional(balance),
-            image.chromaticities};
+            image.chromaticities, metadataValue(image, kViewKey)};
 }
 
 std::string conflictOf(const ColorConditions& of_a, const std::string& a, const ColorConditions& of_b,
@@ -99,6 +99,8 @@ std::string conflictOf(const ColorConditions& of_a, const std::string& a, const 
         return say("white balance", balanceText(*of_a.white_balance), balanceText(*of_b.white_balance));
     if (of_a.chromaticities && of_b.chromaticities && !alike(*of_a.chromaticities, *of_b.chromaticities))
         return say("colour space", spaceText(*of_a.chromaticities), spaceText(*of_b.chromaticities));
+    const auto viewText = [](const std::string& view) { return view.empty() ? std::string("none") : view; };
+    if (of_a.view != of_b.view) return say("view transform", viewText(of_a.view), viewText(of_b.view));
     return {};
 }
 

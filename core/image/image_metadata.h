@@ -21,6 +21,7 @@ inline constexpr const char* kWhiteLuminanceKey = "whiteLuminance";
 /// (https://github.com/AcademySoftwareFoundation/ColorInterop).
 inline constexpr const char* kColorInteropIdKey = "colorInteropID";
 inline constexpr const char* kDisplaySrgbId = "srgb_rec709_display";
+inline constexpr const char* kViewKey = "crt/view";  ///< Of kViewTransformNames, where it is not "none".
 /// The settings of display formats, in files of floats that got neither: as the two above.
 inline constexpr const char* kDisplayExposureKey = "crt/displayExposure";
 inline constexpr const char* kDisplayWhiteBalanceKey = "crt/displayWhiteBalance";
@@ -46,11 +47,13 @@ struct ColorConditions {
     std::optional<double> exposure_ev;                    ///< Nothing: the file does not say.
     std::optional<std::string> white_balance;  ///< As in kWhiteBalanceKey; nothing: the file does not say.
     std::optional<std::array<double, 8>> chromaticities;  ///< Nothing: the file does not say.
+    std::string view;                                     ///< As in kViewKey; empty: none.
 };
 ColorConditions colorConditions(const Image& image);
 
 /// Reason why values under the two settings cannot be compared, one sentence without a full stop, in which
-/// `a` and `b` name them: other exposure, white balance or colour space. Empty when both say the same, or
+/// `a` and `b` name them: other exposure, white balance, colour
+/// space or view transform. Empty when both say the same, or
 /// nothing.
 std::string conflictOf(const ColorConditions& conditions_a, const std::string& a,
                        const ColorConditions& conditions_b, const std::string& b);

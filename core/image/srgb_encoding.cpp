@@ -132,7 +132,7 @@ EncodedImage encodeSrgb8(const Image& image) {
     parallelFor(pixels, std::size_t{1} << 14, [&](std::size_t first, std::size_t end) {
         std::uint64_t clipped_here = 0;
         for (std::size_t p = first; p < end; ++p) {
-            const Vec3d rgb = srgb[p];
+            const Vec3d rgb = onScreen(image.view, srgb[p]);
             for (std::size_t c = 0; c < 3; ++c) {
                 const double value = rgb[c] >= 0.0 ? std::min(rgb[c], 1.0) : 0.0;  // NaN is 0.
                 // One rounding of float in the conversion from another space is no clipping worth a warning.

@@ -22,6 +22,8 @@
 namespace crt {
 namespace {
 
+constexpr const char* kReportExtension = ".report.json";
+
 /// The files that this job writes or may have to write.
 struct Files {
     OutputPlan outputs;
@@ -39,11 +41,20 @@ std::vector<std::string> imageNames(const OutputPlan& plan) {
     return names;
 }
 
+OutputPlan outputsOf(const Job& job, const Scene& scene) {
+    OutputPlan plan = planOutputs(job.outputs, scene);
+    if (!job.output_name) return plan;
+    for (Output& image : plan.images) image.file = job.output_name(image.file);
+    for (std::string& film : plan.films) film = job.output_name(film);
+    plan.first = job.output_name(plan.first);
+    return plan;
+}
+
 /// Names them, and finds out now what cannot be written: it must not take an hour to learn that a directory
 /// is missing.
 Files planFiles(const Job& job, const Scene& scene) {
     Files files;
-    files.outputs = planOutputs(job.outputs, scene);
+    files.outputs = outputsOf(job, scene);
     if (job.outputs.empty()) refuseForeignPlaces(files.outputs.images, scene.file, job.overwrite);
     files.checkpoint = !job.checkpoint_file.empty() ? job.checkpoint_file
                        : !job.resume_file.empty()   ? job.resume_file
@@ -63,7 +74,10 @@ Files planFiles(const Job& job, const Scene& scene) {
             files.resume.clear();
         }
     }
-    files.report = job.report_file ? *job.report_file : besideOutput(files.outputs.first, ".report.json");
+    std::error_code absent;
+    if (job.resume_where_possible && std::filesystem::exists(files.checkpoint, absent))
+        files.resume = files.checkpoint;
+    files.report = job.report_file ? *job.report_file : besideOutput(files.outputs.first, kReportExtension);
 
     std::vector<std::string> written = imageNames(files.outputs), films = files.outputs.films;
     if (!files.report.empty()) written.push_back(files.report);
@@ -206,6 +220,10 @@ void tellTarget(const RunFacts& facts) {
 
 }  // namespace
 
+std::string reportOf(const Job& job, const Scene& scene) {
+    return besideOutput(outputsOf(job, scene).first, kReportExtension);
+}
+
 Scene loadScene(const SceneRequest& request) {
     const Stage stage("reading " + request.file);
     Scene scene = loadScene(request.file, request.overrides);
@@ -260,6 +278,7 @@ int runJob(const Job& job, Watch& watch) {
     // Images, and the report of how they came about.
     RunFacts& facts = run.facts;
     facts.command = job.command;
+    facts.frame = job.frame;
     FirstFailure failure(run.failure);
     if (job.expose_automatically && run.film.samples.count() > 0)
         exposeAutomatically(run.film, *run.identity.record);

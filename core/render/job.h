@@ -7,6 +7,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -30,16 +31,23 @@ struct Job : RenderOptions {
 
     bool resume = false;
     std::string resume_file;                 ///< Empty: the checkpoint of this job.
+    bool resume_where_possible = false;      ///< Resume if there is a checkpoint of this job.
     std::string
         checkpoint_file;  ///< Empty: beside the first output, and only when resuming or when stopped short.
     double checkpoint_interval_seconds = 600;
     bool overwrite = false;                  ///< Also a film of more samples, or what is no film.
 
     std::vector<std::string> outputs;        ///< Instead of the scene's.
+    /// Gives every output its name in this job, those of the scene too. Empty: it stays.
+    std::function<std::string(const std::string&)> output_name{};
     bool expose_automatically = false;       ///< By the film, instead of the scene's exposure.
     std::optional<std::string> report_file;  ///< Unset: beside the first output. Empty: none.
     std::string command;                     ///< As typed, for the report.
+    std::string frame;                       ///< The request of a frame, for its report; else empty.
 };
+
+/// Where the report of a job goes that has its usual place, by the outputs of the command line or the scene.
+std::string reportOf(const Job& job, const Scene& scene);
 
 /// Runs the job and returns the exit code: 0, or that of the StopRequest that ended the sampling early.
 /// Throws crt::Error for everything that goes wrong; when the device fails while rendering, after what there

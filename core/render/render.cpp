@@ -149,7 +149,10 @@ SamplingPlan planSamples(const RenderOptions& options, const Scene& scene, const
 SceneRenderer::SceneRenderer(const Scene& scene, const RenderOptions& options)
     : scene_(scene), options_(options) {}
 
-SceneRenderer::~SceneRenderer() = default;
+SceneRenderer::~SceneRenderer() {
+    devices_.reset();
+    if (options_.kept_session && session_) *options_.kept_session = std::move(session_);
+}
 
 void SceneRenderer::close() {
     devices_.reset();
@@ -162,6 +165,10 @@ void SceneRenderer::open(RunFacts& facts) {
     compiled_.reset();  // Perhaps without an accelerator.
     const Stage stage("opening the backend");
     const Stopwatch opening;
+    if (options_.kept_session && *options_.kept_session) {
+        session_ = std::exchange(*options_.kept_session, std::nullopt);
+        return;
+    }
     session_.emplace(options_.backend, options_.integrator);
     facts.open_seconds = opening.seconds();
     session_->beginOpeningDevice();

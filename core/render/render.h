@@ -35,6 +35,9 @@ struct RenderOptions {
                                         ///< that need not wait for the render. Throws nothing.
     std::uint64_t chunk = 0;  ///< Samples per chunk; 0: so many that a chunk takes at most half a second.
     FasterBackendSearch search{};  ///< Done where no device is named.
+    /// Devices that an earlier render with the same options left open, if any: this render takes them, and
+    /// leaves those that it has in the end. [owner thread]
+    std::shared_ptr<std::optional<Session>> kept_session{};
 };
 
 /// A target error is decided on and judged by different replicates, so there must be some: gives the scene

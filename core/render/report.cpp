@@ -108,6 +108,7 @@ std::string reportJson(const Scene& scene, const CompiledScene& compiled, const 
 
     Json report;
     report["crt"] = {{"version", CRT_VERSION}, {"command", facts.command}, {"finished", utcNow()}};
+    if (!facts.frame.empty()) report["crt"]["request"] = facts.frame;
     report["host"] = {{"cpu", processorName()},
                       {"os", operatingSystem()},
                       {"threads", std::thread::hardware_concurrency()}};

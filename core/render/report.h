@@ -19,6 +19,7 @@ namespace crt {
 /// Everything the report says that is not in Scene or CompiledScene. Times in seconds on the wall clock.
 struct RunFacts {
     std::string command;  ///< As typed, quoted for a shell.
+    std::string frame;    ///< Of a frame of a sequence; else empty.
 
     std::string backend_name, backend_path, backend_version, backend_build;
     std::string driver;

@@ -2,12 +2,15 @@
 
 #include "base/error.h"
 #include "base/input_file.h"
+#include "scene/eulumdat_file.h"
+#include "scene/photometric_text.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
+#include <cctype>
 #include <cmath>
+#include <filesystem>
 #include <numbers>
 
 namespace crt {
@@ -15,95 +18,8 @@ namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
 
-/// The text line by line up to TILT, then number by number.
-class IesText {
-public:
-    IesText(std::string_view text, const std::string& name) : text_(text), name_(name) {}
-
-    [[noreturn]] void fail(const std::string& what) const { failAt(line_, what); }
-    [[noreturn]] void failAt(int line, const std::string& what) const {
-        throw Error(ErrorKind::Scene, what, {name_, line, 0});
-    }
-
-    /// Without its end; false at the end of the file.
-    bool nextLine(std::string_view& line) {
-        if (at_ >= text_.size()) return false;
-        const std::size_t end = std::min(text_.find_first_of("\r\n", at_), text_.size());
-        line = text_.substr(at_, end - at_);
-        at_ = end;
-        if (text_.substr(at_, 2) == "\r\n")
-            at_ += 2;
-        else if (at_ < text_.size())
-            at_ += 1;
-        ++line_;
-        return true;
-    }
-
-    /// The next number; `what` as in messages.
-    double number(const std::string& what) {
-        const std::string_view word = nextWord();
-        if (word.empty()) fail(fmt::format("the file ends where {} should stand", what));
-        double value = 0;
-        const std::size_t sign = word.front() == '+' ? 1 : 0;  // A sign that from_chars does not accept.
-        const auto [end, problem] = std::from_chars(word.data() + sign, word.data() + word.size(), value);
-        if (problem != std::errc() || end != word.data() + word.size() || !std::isfinite(value))
-            fail(fmt::format("expected {}, a number, found '{}'", what, shown(word)));
-        return value;
-    }
-
-    std::size_t count(const std::string& what, std::size_t most) {
-        const double value = number(what);
-        if (!(value >= 1 && value <= static_cast<double>(most)) || value != std::floor(value))
-            fail(fmt::format("{} is {}; it must be a whole number from 1 to {}", what, value, most));
-        return static_cast<std::size_t>(value);
-    }
-
-    std::vector<double> numbers(std::size_t how_many, const std::string& what) {
-        // A number takes two bytes at least: a count that the file cannot hold takes no memory.
-        if (how_many > (rest_.size() + text_.size() - at_) / 2 + 1)
-            fail(fmt::format("the file is too short for {} {}s", how_many, what));
-        std::vector<double> all(how_many);
-        for (std::size_t i = 0; i < how_many; ++i)
-            all[i] = number(fmt::format("{} {} of {}", what, i + 1, how_many));
-        return all;
-    }
-
-    int line() const { return line_; }
-    bool atEnd() { return nextWord().empty(); }
-
-private:
-    static bool isBetween(char c) { return c == ' ' || c == '\t' || c == ',' || c == '\0'; }
-
-    std::string_view nextWord() {
-        while (rest_.empty()) {
-            if (!nextLine(rest_)) return {};
-            skip();
-        }
-        const auto* end = std::find_if(rest_.begin(), rest_.end(), isBetween);
-        const auto length = static_cast<std::size_t>(end - rest_.begin());
-        const std::string_view word = rest_.substr(0, length);
-        rest_.remove_prefix(length);
-        skip();
-        return word;
-    }
-    void skip() {
-        while (!rest_.empty() && isBetween(rest_.front())) rest_.remove_prefix(1);
-    }
-    static std::string shown(std::string_view word) {
-        std::string text(word.substr(0, 40));
-        for (char& c : text)
-            if (c < ' ' || c > '~') c = '?';
-        return text;
-    }
-
-    std::string_view text_, rest_;
-    std::string name_;
-    std::size_t at_ = 0;
-    int line_ = 0;
-};
-
 /// Reads over the labels. Returns what TILT is.
-std::string_view tilt(IesText& text) {
+std::string_view tilt(PhotometricText& text) {
     std::string_view line;
     constexpr std::string_view kTilt = "TILT=";
     constexpr int kMostLabels = 100'000;
@@ -114,70 +30,6 @@ std::string_view tilt(IesText& text) {
         return line.substr(0, line.find_last_not_of(" \t") + 1);
     }
     text.fail("this is not an IES file: the line 'TILT=' is missing");
-}
-
-void requireIncreasing(const IesText& text, int line, const std::vector<double>& angles, const char* kind) {
-    for (std::size_t i = 1; i < angles.size(); ++i)
-        if (!(angles[i] > angles[i - 1]))
-            text.failAt(line, fmt::format("{} angles must increase, but {} follows {}", kind, angles[i],
-                                          angles[i - 1]));
-}
-
-void checkVertical(const IesText& text, int line, const std::vector<double>& angles) {
-    requireIncreasing(text, line, angles, "vertical");
-    const double first = angles.front(), last = angles.back();
-    if ((first != 0 && first != 90) || (last != 90 && last != 180) || first == last)
-        text.failAt(line, fmt::format("vertical angles go from {} to {}; photometry of type C has 0 to 90, "
-                                      "0 to 180 or 90 to 180",
-                                      first, last));
-}
-
-/// The columns of a file, by their horizontal angles.
-struct Columns {
-    std::vector<double> angles;
-    std::vector<std::size_t> of;  ///< The column of the file for each of them.
-};
-
-/// Values that the file leaves out because it is symmetric.
-Columns allRound(const IesText& text, int line, const std::vector<double>& angles) {
-    requireIncreasing(text, line, angles, "horizontal");
-    const double first = angles.front(), last = angles.back();
-    Columns all;
-    for (std::size_t i = 0; i < angles.size(); ++i) {
-        all.angles.push_back(angles[i]);
-        all.of.push_back(i);
-    }
-    // Adds the columns there are, mirrored in the last one.
-    const auto mirror = [&all](double in) {
-        for (std::size_t i = all.angles.size() - 1; i-- > 0;) {
-            all.angles.push_back(2 * in - all.angles[i]);
-            all.of.push_back(all.of[i]);
-        }
-    };
-    if (first == 90 && last == 270) {
-        // Symmetric in the plane of 90 and 270 degrees: what lies at φ also lies at 180 − φ.
-        Columns turned;
-        const auto add = [&](double angle, std::size_t column) {
-            turned.angles.push_back(angle);
-            turned.of.push_back(column);
-        };
-        for (std::size_t i = angles.size(); i-- > 0;)  // 0 to 90: from 180 to 90.
-            if (angles[i] <= 180) add(180 - angles[i], i);
-        const bool has_zero = turned.angles.front() == 0;
-        for (std::size_t i = 1; i + 1 < angles.size(); ++i) add(angles[i], i);
-        for (std::size_t i = angles.size(); i-- > 0;)  // 270 to 360: from 270 to 180.
-            if (angles[i] >= 180) add(540 - angles[i], i);
-        if (!has_zero)
-            text.failAt(line, "horizontal angles from 90 to 270 degrees must have 180 among them");
-        return turned;
-    }
-    if (first != 0 || (last != 0 && last != 90 && last != 180 && last != 360))
-        text.failAt(line, fmt::format("horizontal angles go from {} to {}; photometry of type C has 0 "
-                                      "alone, 0 to 90, 0 to 180, 90 to 270 or 0 to 360",
-                                      first, last));
-    if (last == 90) mirror(90);
-    if (last == 90 || last == 180) mirror(180);
-    return all;
 }
 
 /// ∫ (linear from a at x to b at y) sin θ dθ.
@@ -191,7 +43,7 @@ double ringIntegral(double x, double y, double a, double b) {
 }  // namespace
 
 IesProfile parseIes(std::string_view text_of_file, const std::string& name) {
-    IesText text(text_of_file, name);
+    PhotometricText text(text_of_file, name);
     const std::string_view how = tilt(text);
     if (how == "INCLUDE") {
         text.number("the lamp's position");
@@ -227,7 +79,7 @@ IesProfile parseIes(std::string_view text_of_file, const std::string& name) {
     profile.vertical_deg = text.numbers(vertical, "vertical angle");
     checkVertical(text, text.line(), profile.vertical_deg);
     const std::vector<double> planes = text.numbers(horizontal, "horizontal angle");
-    const Columns columns = allRound(text, text.line(), planes);
+    const PhotometricColumns columns = allRound(text, text.line(), planes);
     if (columns.angles.size() * vertical > kMostIesValues)
         text.fail(fmt::format("{} × {} values, written out, are more than {}", columns.angles.size(),
                               vertical, kMostIesValues));
@@ -238,17 +90,16 @@ IesProfile parseIes(std::string_view text_of_file, const std::string& name) {
             text.fail(fmt::format("a candela value is {}; it must be 0 or more", measured[i]));
     }
     if (!text.atEnd()) text.fail("the file continues after the last candela value; is a count too small?");
-    profile.horizontal_deg = columns.angles;
-    for (const std::size_t column : columns.of)
-        profile.candela.insert(profile.candela.end(),
-                               measured.begin() + static_cast<std::ptrdiff_t>(column * vertical),
-                               measured.begin() + static_cast<std::ptrdiff_t>((column + 1) * vertical));
+    spread(columns, measured, profile);
     return profile;
 }
 
-IesProfile readIesFile(const std::string& path) {
+IesProfile readPhotometricFile(const std::string& path) {
+    std::string end = std::filesystem::path(path).extension().string();
+    std::transform(end.begin(), end.end(), end.begin(), [](unsigned char c) { return std::tolower(c); });
     try {
-        return parseIes(readInput(path, kMostIesBytes), path);
+        const std::string text = readInput(path, kMostIesBytes);
+        return end == ".ldt" ? parseEulumdat(text, path) : parseIes(text, path);
     } catch (const InputRefused& refused) {
         throw Error(ErrorKind::Scene, fmt::format("'{}' {}", path, refused.what()), {path});
     }

@@ -25,8 +25,9 @@ inline constexpr std::uint64_t kMostIesBytes = std::uint64_t{64} << 20;
 inline constexpr std::size_t kMostIesAngles = 10'000;          ///< Of each kind, in the file.
 inline constexpr std::size_t kMostIesValues = std::size_t{1} << 22;  ///< Written out.
 
-/// Throws crt::Error(Scene) with file and line.
-IesProfile readIesFile(const std::string& path);
+/// A file whose name ends in .ldt is EULUMDAT (eulumdat_file.h), any other IES. Throws crt::Error(Scene)
+/// with file and line.
+IesProfile readPhotometricFile(const std::string& path);
 /// `name` as in messages.
 IesProfile parseIes(std::string_view text, const std::string& name);
 

@@ -7,6 +7,7 @@
 #include "image/development.h"
 #include "image/output_format.h"
 #include "scene/aov.h"
+#include "scene/clear_sky.h"
 #include "scene/ies_file.h"
 #include "scene/integrator_type.h"
 #include "scene/material.h"
@@ -66,6 +67,7 @@ struct FilmSettings {
     std::optional<Spectrum> white_balance;  ///< Adapt from this illuminant's white to the colour space's.
     double exposure_ev = 0;                 ///< The image is multiplied by 2^ev.
     bool apply_to_float = false;            ///< EXR and PFM get white balance and exposure too.
+    ViewTransform view = ViewTransform::None;  ///< Of PNG, JPEG and PPM.
     SpectralFilm spectral;                  ///< Beside X, Y and Z.
 };
 
@@ -234,13 +236,27 @@ struct CieSky {
     int rows = 256;           ///< Of the image that it becomes, twice as wide.
 };
 
+/// A clear sky with the colours of its light (clear_sky.h). Its sun is a separate light.
+struct ClearSky {
+    double turbidity = 3;  ///< 1 to 10.
+    SkyValues ground_albedo{};
+    Vec3d towards_sun{0, 1, 0};  ///< Unit, not below the horizon.
+    double scale = 1;            ///< Times the model's radiance.
+    Axes axes;                   ///< The zenith is `up`.
+    int rows = 256;              ///< Of the image that it becomes, twice as wide.
+
+    /// Of the sun at its elevation.
+    ClearSkyModel model() const;
+};
+
 struct Environment {
-    Spectrum radiance;            ///< The same in every direction; or times what `image` or `sky` has.
+    Spectrum radiance;            ///< The same in every direction; or times what `image` or a sky has.
     bool light_sampling = false;  ///< Is it a light to sample, or left to scattered rays?
     std::optional<EnvironmentImage> image{};
     std::optional<CieSky> sky{};
+    std::optional<ClearSky> clear_sky{};
 
-    bool dependsOnDirection() const { return image || sky; }
+    bool dependsOnDirection() const { return image || sky || clear_sky; }
 };
 
 struct Output {

@@ -74,17 +74,17 @@ NamedData glass(const data::Glass& glass) {
     return row;
 }
 
+std::vector<double> listOf(std::span<const double> values) { return {values.begin(), values.end()}; }
+
 NamedData metal(const data::Metal& metal) {
-    NamedData row{.name = fmt::format("metals/{}", metal.symbol),
-                  .title = fmt::format("{}; n + ik", metal.name),
-                  .quantity = "complex refractive index",
-                  .source = std::string(data::kMetalSource),
-                  .outside = "clamp",
-                  .columns = {"n", "k"},
-                  .values = {{metal.n.begin(), metal.n.end()}, {metal.k.begin(), metal.k.end()}}};
-    for (std::size_t i = 0; i < data::kMetalSize; ++i)
-        row.wavelength_nm.push_back(data::metalWavelength_nm(i));
-    return row;
+    return {.name = fmt::format("metals/{}", metal.symbol),
+            .title = fmt::format("{}; n + ik", metal.name),
+            .quantity = "complex refractive index",
+            .source = std::string(metal.source),
+            .outside = "clamp",
+            .wavelength_nm = listOf(metal.wavelength_nm),
+            .columns = {"n", "k"},
+            .values = {listOf(metal.n), listOf(metal.k)}};
 }
 
 std::optional<NamedData> builtIn(const std::string& family, const std::string& name) {

@@ -111,6 +111,46 @@ Spectrum sigmoidSpectrum(const Vec3d& c) {
     return s;
 }
 
+double sigmoidAt(const Vec3d& c, double t) {
+    const double x = c[0] + t * (c[1] + t * c[2]);
+    return sigmoid(x, std::sqrt(1.0 + x * x));
+}
+
+Vec3d nearestSigmoid(std::span<const SigmoidTarget> targets) {
+    // Begins with the quadratic that is nearest before the sigmoid bends it, and improves that.
+    constexpr int kSteps = 4;
+    Vec3d c{};
+    for (int step = 0; step <= kSteps; ++step) {
+        Matrix3d normal{}, of_colour{};
+        Vec3d gradient{}, colour{};
+        for (const SigmoidTarget& target : targets) {
+            const double value = std::clamp(target.value, 1e-6, 1 - 1e-6);
+            const double x = step == 0 ? inverseSigmoid(value) : c[0] + target.t * (c[1] + target.t * c[2]);
+            const double root = std::sqrt(1 + x * x), slope = 0.5 / (root * root * root);
+            const double off = step == 0 ? slope * x : value - sigmoid(x, root);
+            const Vec3d row{slope, slope * target.t, slope * target.t * target.t};
+            for (std::size_t i = 0; i < 3; ++i) {
+                gradient[i] += target.weight * row[i] * off;
+                for (std::size_t j = 0; j < 3; ++j) {
+                    normal[i][j] += target.weight * row[i] * row[j];
+                    of_colour[i][j] += target.colour[i] * row[j];
+                }
+                colour[i] += target.colour[i] * off;
+            }
+        }
+        if (step > 0)
+            for (std::size_t i = 0; i < 3; ++i)
+                for (std::size_t k = 0; k < 3; ++k) {
+                    gradient[i] += of_colour[k][i] * colour[k];
+                    for (std::size_t j = 0; j < 3; ++j) normal[i][j] += of_colour[k][i] * of_colour[k][j];
+                }
+        Vec3d change{};
+        if (!solve(normal, gradient, change)) break;
+        c = c + change;
+    }
+    return c;
+}
+
 const std::array<Spectrum, 3>& rgbWeights() {
     static const std::array<Spectrum, 3> weights = [] {
         const Spectrum d65 = *illuminantSpectrum("D65");

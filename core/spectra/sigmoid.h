@@ -75,4 +75,17 @@ Vec3d fittedSigmoid(const Vec3d& rgb);
 /// The reflectance on the 1 nm grid.
 Spectrum sigmoidSpectrum(const Vec3d& c);
 
+/// The reflectance at t.
+double sigmoidAt(const Vec3d& c, double t);
+
+/// A value in (0, 1) that a sigmoid is to have at t.
+struct SigmoidTarget {
+    double t, value, weight;
+    Vec3d colour;  ///< Of a value of 1: its part of a colour that is to be kept, about 1.
+};
+
+/// The sigmoid for which Σ weight · off² + |Σ colour · off|² is least, where off is its value less the
+/// target's, by a few steps of Gauss and Newton.
+Vec3d nearestSigmoid(std::span<const SigmoidTarget> targets);
+
 }  // namespace crt

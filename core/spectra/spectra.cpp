@@ -378,8 +378,7 @@ Spectrum cauchyIndex(const std::vector<double>& coefficients_um) {
 std::optional<std::pair<Spectrum, Spectrum>> metalIndex(std::string_view name) {
     for (const data::Metal& metal : data::kMetals) {
         if (metal.symbol != name && metal.name != name) continue;
-        std::vector<double> wavelength(data::kMetalSize);
-        for (std::size_t i = 0; i < wavelength.size(); ++i) wavelength[i] = data::metalWavelength_nm(i);
+        const std::vector<double> wavelength(metal.wavelength_nm.begin(), metal.wavelength_nm.end());
         return std::pair{resample(wavelength, {metal.n.begin(), metal.n.end()}, Outside::Clamp),
                          resample(wavelength, {metal.k.begin(), metal.k.end()}, Outside::Clamp)};
     }

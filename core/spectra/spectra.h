@@ -110,7 +110,7 @@ Spectrum blackbodySpectrum(double temperature_K, bool normalise);
 std::optional<Spectrum> illuminantSpectrum(std::string_view name);
 const std::vector<std::string>& illuminantNames();
 
-/// Refractive index of a named glass ("N-BK7", "SF10", "SF11", "fused_silica", "diamond").
+/// Refractive index of a named glass, crystal or plastic, such as "N-BK7", "diamond" or "acrylic".
 std::optional<Spectrum> glassIndex(std::string_view name);
 const std::vector<std::string>& glassNames();
 /// n(λ) by Sellmeier: n² − 1 = Σ Bᵢλ²/(λ² − Cᵢ), λ in µm, C in µm².
@@ -118,8 +118,7 @@ Spectrum sellmeierIndex(const std::array<double, 3>& B, const std::array<double,
 /// n(λ) by Cauchy: n = A + B/λ² + …, λ in µm.
 Spectrum cauchyIndex(const std::vector<double>& coefficients_um);
 
-/// Complex refractive index (n, k) of a named metal: "Ag", "Al", "Au", "Cu" (or silver, aluminium, gold,
-/// copper).
+/// Complex refractive index (n, k) of a metal by symbol or name: "Ag" or "silver".
 std::optional<std::pair<Spectrum, Spectrum>> metalIndex(std::string_view name);
 const std::vector<std::string>& metalNames();
 

@@ -1,5 +1,5 @@
-/// Declarations of the measured tables in spectra_data.cpp. Only spectra.cpp, rgb_spectrum.cpp and
-/// data_catalogue.cpp read them.
+/// Declarations of the measured tables in spectra_data.cpp and metals_data.cpp. Only spectra.cpp,
+/// rgb_spectrum.cpp and data_catalogue.cpp read them.
 #pragma once
 
 #include <array>
@@ -32,27 +32,15 @@ struct Glass {
     std::array<double, 3> C_um2;
     std::string_view source;
 };
-extern const std::array<Glass, 7> kGlasses;
+extern const std::array<Glass, 26> kGlasses;
 
-inline constexpr int kMetalSize = 56;
-inline constexpr double kMetalFirst_eV =
-    4.15;  ///< Photon energy of the first sample; the rest follow downwards.
-inline constexpr double kMetalStep_eV = 0.05;
-
-/// Wavelength of the sample `i` of a metal.
-constexpr double metalWavelength_nm(std::size_t i) {
-    constexpr double kElectronVoltNanometre = 1239.841984;  // h c / e, CODATA 2018.
-    return kElectronVoltNanometre / (kMetalFirst_eV - kMetalStep_eV * static_cast<double>(i));
-}
-
-/// Complex refractive index n + ik at kMetalFirst_eV, kMetalFirst_eV − kMetalStep_eV, …
+/// Complex refractive index n + ik at some wavelengths, ascending.
 struct Metal {
     std::string_view symbol;
     std::string_view name;
-    std::span<const double, kMetalSize> n;
-    std::span<const double, kMetalSize> k;
+    std::span<const double> wavelength_nm, n, k;
+    std::string_view source;
 };
-extern const std::string_view kMetalSource;
-extern const std::array<Metal, 4> kMetals;
+extern const std::array<Metal, 21> kMetals;
 
 }  // namespace crt::data

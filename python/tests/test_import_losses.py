@@ -215,9 +215,8 @@ def ground(folder, turbidity, elevation_deg, more, older=False):
 
 @pytest.mark.parametrize("turbidity, elevation_deg, sky, sun", MEASURED)
 def test_sun_and_sky_light_level_ground_as_in_mitsuba(tmp_path, turbidity, elevation_deg, sky, sun):
-    # The tables are linear between their elevations and turbidities: 5 %.
-    near(ground(tmp_path, turbidity, elevation_deg, '<float name="sun_scale" value="0"/>'), sky, 0.05)
-    near(ground(tmp_path, turbidity, elevation_deg, '<float name="sky_scale" value="0"/>'), sun, 0.05)
+    near(ground(tmp_path, turbidity, elevation_deg, '<float name="sun_scale" value="0"/>'), sky, 0.02)
+    near(ground(tmp_path, turbidity, elevation_deg, '<float name="sky_scale" value="0"/>'), sun, 0.02)
 
 
 def test_scales_count_and_older_scenes_have_y_up(tmp_path):
@@ -237,8 +236,22 @@ def test_a_sun_below_the_horizon_is_said(tmp_path):
 
 def test_the_sun_stands_where_mitsuba_has_it_by_time_and_place(tmp_path):
     made = of_mitsuba(tmp_path, '<emitter type="sunsky"><float name="hour" value="9"/></emitter>')
-    towards = -np.array(made.content["lights"][0]["direction"])
+    towards = -np.array(made.content["environment"]["clear_sky"]["direction"])
     assert np.allclose(towards, [0.0956952, -0.614786, 0.782867], atol=5e-4)  # Mitsuba 3.9.1.
+
+
+def test_a_sky_and_a_sun_become_one_clear_sky(tmp_path):
+    south = '<vector name="sun_direction" x="1" y="0" z="0.5"/>'
+    sky = f'<emitter type="sky">{south}<float name="scale" value="2"/></emitter>'
+    sun = (f'<emitter type="sun">{south}<float name="sun_scale" value="3"/>'
+           '<float name="sun_aperture" value="5"/></emitter>')
+    for body in (sky + sun, sun + sky):
+        made = of_mitsuba(tmp_path, body)
+        found = made.content["environment"]["clear_sky"]
+        assert (found["scale"], found["sun_scale"], found["sun_diameter_deg"]) == (2, 3, 5)
+        assert not made.losses
+    made = of_mitsuba(tmp_path, sky + sky)
+    assert [loss.what for loss in made.losses] == ["a second environment"]
 
 
 # Geometry that only Mitsuba lays out so.

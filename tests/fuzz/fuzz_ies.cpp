@@ -1,6 +1,7 @@
-// IES files → distributions.
+// IES and EULUMDAT files → distributions. A EULUMDAT file begins with the byte 'L'.
 #include "fuzz_target.h"
 
+#include "scene/eulumdat_file.h"
 #include "scene/ies_file.h"
 
 #include <algorithm>
@@ -9,8 +10,9 @@
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     using namespace crt;
     fuzz::expectRefusalOrSuccess(ErrorKind::Scene, [&] {
-        const IesProfile profile =
-            parseIes({reinterpret_cast<const char*>(data), size}, "a.ies");
+        const std::string_view text(reinterpret_cast<const char*>(data), size);
+        const IesProfile profile = text.starts_with('L') ? parseEulumdat(text.substr(1), "a.ldt")
+                                                         : parseIes(text, "a.ies");
         if (profile.candela.size() != profile.vertical_deg.size() * profile.horizontal_deg.size())
             fuzz::finding("ies", "a distribution of another size than its angles");
         if (!std::is_sorted(profile.horizontal_deg.begin(), profile.horizontal_deg.end()))

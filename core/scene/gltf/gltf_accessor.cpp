@@ -90,6 +90,11 @@ GltfAccessor::GltfAccessor(GltfFile& file, int index, std::string pointer)
     components_ = componentsOf(accessor.type);
     normalized_ = accessor.normalized;
     if (components_ == 0) file.fail(at + "/type", "its type is unknown");
+    if (const DracoValues* const decoded = file.decoded(index)) {
+        plain_ = {decoded->bytes.data(), bytesOf(accessor.componentType) * components_,
+                  accessor.componentType};
+        return;
+    }
     const bool sparse = accessor.sparse.isSparse && accessor.sparse.count > 0;
     if (accessor.bufferView >= 0) {
         const std::size_t stride =

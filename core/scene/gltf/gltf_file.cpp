@@ -2,8 +2,10 @@
 
 #include "base/error.h"
 #include "base/input_file.h"
+#include "base/words.h"
 #include "scene/gltf/gltf_json.h"
 #include "scene/gltf/gltf_model.h"
+#include "scene/scene_limits.h"
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -181,6 +183,15 @@ void GltfFile::check(const GltfJson& json) {
             json.member(buffers[i], "byteLength", 0, [&] { return fmt::format("/buffers/{}", i); });
         buffer.in_container = i == 0 && !buffers[i].contains("uri") && !binary_.empty();
     }
+    const Value& views = json.list("bufferViews");
+    for (std::size_t i = 0; i < views.size(); ++i)
+        if (const auto how = json.meshoptOf(views[i], fmt::format("/bufferViews/{}", i))) meshopt_[i] = *how;
+    const Value& meshes = json.list("meshes");
+    for (std::size_t i = 0; i < meshes.size(); ++i)
+        for (std::size_t k = 0; k < meshes[i]["primitives"].size(); ++k)
+            if (auto how =
+                    json.dracoOf(meshes[i]["primitives"][k], fmt::format("/meshes/{}/primitives/{}", i, k)))
+                draco_[{i, k}] = *std::move(how);
     animations_ = json.list("animations").size();
     const Value& images = json.list("images");
     for (std::size_t i = 0; i < images.size(); ++i) {
@@ -215,6 +226,13 @@ GltfFile::GltfFile(const std::string& path) : path_(path), model_(std::make_uniq
     if (const auto meshes = json.root.find("meshes"); meshes != json.root.end())
         for (Value& mesh : *meshes)
             for (Value& primitive : mesh["primitives"]) primitive.erase("targets");  // All of weight 0.
+    // tinygltf wants a view of indices that only Draco knows. Nothing reads it.
+    for (const auto& [place, how] : draco_) {
+        const Value& primitive = json.root["meshes"][place.first]["primitives"][place.second];
+        if (!primitive.contains("indices")) continue;
+        Value& indices = json.root["accessors"][primitive["indices"].get<std::size_t>()];
+        if (!indices.contains("bufferView")) indices["bufferView"] = how.view;
+    }
     const std::string text = json.root.dump();
     std::vector<std::size_t> primitives;
     for (const Value& mesh : json.list("meshes")) primitives.push_back(mesh.at("primitives").size());
@@ -298,15 +316,77 @@ std::string_view GltfFile::buffer(std::size_t index) {
 std::string_view GltfFile::view(int buffer_view, const std::string& pointer) {
     if (buffer_view < 0 || static_cast<std::size_t>(buffer_view) >= model_->bufferViews.size())
         fail(pointer, "it names no buffer view");
-    const tinygltf::BufferView& view = model_->bufferViews[static_cast<std::size_t>(buffer_view)];
+    const auto index = static_cast<std::size_t>(buffer_view);
+    if (const auto how = meshopt_.find(index); how != meshopt_.end())
+        return decompressed(index, how->second);
+    const tinygltf::BufferView& view = model_->bufferViews[index];
     const std::string at = fmt::format("/bufferViews/{}", buffer_view);
     if (view.buffer < 0 || static_cast<std::size_t>(view.buffer) >= buffers_.size())
         fail(at + "/buffer", "it names no buffer");
-    const std::string_view bytes = buffer(static_cast<std::size_t>(view.buffer));
-    if (view.byteOffset > bytes.size() || view.byteLength > bytes.size() - view.byteOffset)
-        fail(at, fmt::format("{} bytes from {} on are beyond buffer {}, which has {}", view.byteLength,
-                             view.byteOffset, view.buffer, bytes.size()));
-    return bytes.substr(view.byteOffset, view.byteLength);
+    return bytesOf(static_cast<std::size_t>(view.buffer), view.byteOffset, view.byteLength, at);
+}
+
+std::string_view GltfFile::bytesOf(std::size_t index, std::uint64_t offset, std::uint64_t length,
+                                   const std::string& pointer) {
+    const std::string_view bytes = buffer(index);
+    if (offset > bytes.size() || length > bytes.size() - offset)
+        fail(pointer, fmt::format("{} bytes from {} on are beyond buffer {}, which has {}", length, offset,
+                                  index, bytes.size()));
+    return bytes.substr(offset, length);
+}
+
+std::string_view GltfFile::decompressed(std::size_t buffer_view, const MeshoptView& how) {
+    if (const auto known = decompressed_.find(buffer_view); known != decompressed_.end())
+        return known->second;
+    const std::string pointer = fmt::format("/bufferViews/{}", buffer_view);
+    const std::string_view bytes = bytesOf(how.buffer, how.offset, how.length, pointer);
+    const std::string too_many =
+        ExpansionLimit(bytes.size()).refusal(how.count, "elements of a compressed buffer view", how.stride);
+    if (!too_many.empty()) fail(pointer, too_many);
+    std::string made = decodeMeshopt(how, bytes);
+    if (made.empty())
+        fail(pointer, "meshoptimizer cannot decompress it: it is damaged, or of a version that is too new");
+    return decompressed_[buffer_view] = std::move(made);
+}
+
+void GltfFile::decodePrimitive(std::size_t mesh, std::size_t primitive) {
+    const auto found = draco_.find({mesh, primitive});
+    if (found == draco_.end()) return;
+    const DracoPrimitive how = found->second;
+    draco_.erase(found);  // Once.
+    const std::string pointer = fmt::format("/meshes/{}/primitives/{}", mesh, primitive);
+    std::string why;
+    const DracoMesh decoded(view(how.view, pointer), why);
+    if (!why.empty())
+        fail(pointer, fmt::format("Draco cannot decode it: {}", printable(why).substr(0, 200)));
+    const tinygltf::Primitive& model = model_->meshes[mesh].primitives[primitive];
+    const auto keep = [&](int accessor, const std::string& what, const auto& values) {
+        const tinygltf::Accessor& form = model_->accessors[static_cast<std::size_t>(accessor)];
+        DracoValues made = values(form);
+        if (made.count == 0)
+            fail(fmt::format("/accessors/{}", accessor),
+                 fmt::format("the Draco mesh has no {} of this type", what));
+        if (made.count != form.count)
+            fail(fmt::format("/accessors/{}/count", accessor),
+                 fmt::format("{} elements, and the Draco mesh has {}", form.count, made.count));
+        decoded_[accessor] = std::move(made);
+    };
+    if (model.indices < 0) fail(pointer, "'indices' is missing");
+    keep(model.indices, "corners",
+         [&](const tinygltf::Accessor& form) { return decoded.corners(form.componentType); });
+    for (const auto& [name, id] : how.ids)
+        if (const auto accessor = model.attributes.find(name); accessor != model.attributes.end())
+            keep(accessor->second, name, [&, unique = id](const tinygltf::Accessor& form) {
+                const int components =
+                    tinygltf::GetNumComponentsInType(static_cast<std::uint32_t>(form.type));
+                return decoded.attribute(unique, form.componentType,
+                                         static_cast<std::size_t>(std::max(components, 0)));
+            });
+}
+
+const DracoValues* GltfFile::decoded(int accessor) const {
+    const auto found = decoded_.find(accessor);
+    return found == decoded_.end() ? nullptr : &found->second;
 }
 
 GltfFile::Image GltfFile::image(std::size_t index) {

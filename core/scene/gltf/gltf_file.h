@@ -2,6 +2,8 @@
 /// turns the JSON into structures; it is given no bytes and opens no file.
 #pragma once
 
+#include "scene/gltf/gltf_compression.h"
+
 #include <cstddef>
 #include <cstdint>
 #include <map>
@@ -27,7 +29,7 @@ class GltfFile {
 public:
     /// Reads a file and checks that everything it names by number is there. Throws crt::Error(Scene),
     /// "a.glb: /nodes/3/mesh: …" with a JSON pointer, for one that is damaged, no glTF 2.0, or needs what
-    /// crt does not have (Draco, meshopt, morph targets of a weight).
+    /// crt does not have (KTX2, morph targets of a weight).
     explicit GltfFile(const std::string& path);
     ~GltfFile();
     GltfFile(const GltfFile&) = delete;
@@ -42,6 +44,11 @@ public:
     /// The bytes of a buffer view. Reads the buffer's file when it is first asked for. `pointer` is what
     /// names the view, for messages. Throws crt::Error(Scene).
     std::string_view view(int buffer_view, const std::string& pointer);
+
+    /// Decodes a primitive that Draco compressed; does nothing for others. Throws crt::Error(Scene).
+    void decodePrimitive(std::size_t mesh, std::size_t primitive);
+    /// The elements of an accessor that decodePrimitive() decoded; null where they are in its buffer view.
+    const DracoValues* decoded(int accessor) const;
 
     /// An image: a file beside this one, or bytes in it.
     struct Image {
@@ -75,6 +82,9 @@ private:
     void checkText() const;
     void check(const GltfJson& json);
     std::string_view buffer(std::size_t index);
+    std::string_view bytesOf(std::size_t buffer, std::uint64_t offset, std::uint64_t length,
+                             const std::string& pointer);
+    std::string_view decompressed(std::size_t buffer_view, const MeshoptView& how);
     /// The path of a file that a URI names.
     std::string pathOf(const std::string& uri, const std::string& pointer) const;
     std::optional<std::string> dataOf(const std::string& uri, const std::string& pointer) const;
@@ -84,6 +94,10 @@ private:
     bool allow_outside_ = false;
     std::vector<Buffer> buffers_;
     std::vector<ImageSource> images_;
+    std::map<std::size_t, MeshoptView> meshopt_;  ///< By buffer view.
+    std::map<std::size_t, std::string> decompressed_;
+    std::map<std::pair<std::size_t, std::size_t>, DracoPrimitive> draco_;  ///< By mesh and primitive.
+    std::map<int, DracoValues> decoded_;                                   ///< By accessor.
     std::size_t animations_ = 0;
     std::vector<std::string> files_read_;
     std::unique_ptr<tinygltf::Model> model_;

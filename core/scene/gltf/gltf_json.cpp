@@ -1,6 +1,7 @@
 #include "scene/gltf/gltf_json.h"
 
 #include <algorithm>
+#include <initializer_list>
 #include <set>
 
 namespace crt {
@@ -9,7 +10,10 @@ namespace {
 using Value = nlohmann::json;
 
 /// Extensions whose absence would be seen, and which crt has.
-const std::set<std::string, std::less<>> kKnownExtensions{"KHR_lights_punctual",
+const std::set<std::string, std::less<>> kKnownExtensions{"EXT_meshopt_compression",
+                                                          "KHR_meshopt_compression",
+                                                          "KHR_draco_mesh_compression",
+                                                          "KHR_lights_punctual",
                                                           "KHR_materials_clearcoat",
                                                           "KHR_materials_emissive_strength",
                                                           "KHR_materials_ior",
@@ -26,6 +30,14 @@ const std::set<std::string, std::less<>> kKnownExtensions{"KHR_lights_punctual",
                                                           "KHR_materials_variants",
                                                           "KHR_materials_diffuse_transmission",
                                                           "KHR_materials_pbrSpecularGlossiness"};
+
+/// The object of an extension; null where it is not there.
+const Value* extensionOf(const Value& object, const char* name) {
+    const auto extensions = object.find("extensions");
+    if (extensions == object.end() || !extensions->is_object()) return nullptr;
+    const auto found = extensions->find(name);
+    return found == extensions->end() ? nullptr : &*found;
+}
 
 }  // namespace
 
@@ -72,14 +84,6 @@ void GltfJson::checkAsset() const {
             item.is_string() ? item.get<std::string>().substr(0, 100) : describeJson(item);
         if (knowsGltfExtension(name)) continue;
         const std::string at = fmt::format("/extensionsRequired/{}", i);
-        if (name == "KHR_draco_mesh_compression")
-            file.fail(at,
-                      "its meshes are compressed by Draco, which crt does not support; export it without "
-                      "mesh compression");
-        if (name == "EXT_meshopt_compression" || name == "KHR_meshopt_compression")
-            file.fail(at,
-                      "its meshes are compressed by meshopt, which crt does not support; 'gltfpack -noq' "
-                      "without '-c' writes them uncompressed");
         if (name == "KHR_texture_basisu")
             file.fail(at,
                       "its textures are KTX2 files, which crt does not read; export them as PNG or JPEG");
@@ -98,6 +102,7 @@ void GltfJson::checkBytes() const {
             stride > 252 || stride % 4 != 0)
             file.fail(at() + "/byteStride",
                       fmt::format("a stride of {} bytes: it must be a multiple of 4 up to 252", stride));
+        (void)meshoptOf(views[i], at());
     }
     const Value& accessors = list("accessors");
     for (std::size_t i = 0; i < accessors.size(); ++i) {
@@ -130,13 +135,71 @@ void GltfJson::checkBytes() const {
     }
 }
 
+std::optional<MeshoptView> GltfJson::meshoptOf(const Value& view, const std::string& at) const {
+    for (const char* name : {"EXT_meshopt_compression", "KHR_meshopt_compression"}) {
+        const Value* const found = extensionOf(view, name);
+        if (found == nullptr) continue;
+        const std::string pointer = fmt::format("{}/extensions/{}", at, name);
+        const auto here = [&] { return pointer; };
+        requireObject(*found, here);
+        index(*found, "buffer", count("buffers"), "buffer", here, true);
+        const auto word = [&](const char* key, const char* fallback,
+                              std::initializer_list<const char*> words) {
+            const auto value = found->find(key);
+            const std::string text = value == found->end() ? fallback
+                                     : value->is_string()  ? value->get<std::string>()
+                                                           : describeJson(*value);
+            const auto place = std::find(words.begin(), words.end(), text);
+            if (place == words.end())
+                file.fail(
+                    fmt::format("{}/{}", pointer, key),
+                    fmt::format("expected {}; found '{}'", fmt::join(words, ", "), text.substr(0, 60)));
+            return place - words.begin();
+        };
+        const MeshoptView made{
+            .buffer = found->at("buffer").get<std::uint64_t>(),
+            .offset = member(*found, "byteOffset", 0, here),
+            .length = member(*found, "byteLength", 0, here),
+            .stride = member(*found, "byteStride", 0, here),
+            .count = member(*found, "count", 0, here),
+            .mode = static_cast<MeshoptView::Mode>(word("mode", "", {"ATTRIBUTES", "TRIANGLES", "INDICES"})),
+            .filter = static_cast<MeshoptView::Filter>(
+                word("filter", "NONE", {"NONE", "OCTAHEDRAL", "QUATERNION", "EXPONENTIAL"}))};
+        if (const std::string fault = faultOf(made); !fault.empty()) file.fail(pointer, fault);
+        if (made.count > 0xffffffffu ||
+            made.count * made.stride != member(view, "byteLength", 0, [&] { return at; }))
+            file.fail(pointer, fmt::format("{} elements of {} bytes are not the bytes of the buffer view",
+                                           made.count, made.stride));
+        return made;
+    }
+    return std::nullopt;
+}
+
+std::optional<DracoPrimitive> GltfJson::dracoOf(const Value& primitive, const std::string& at) const {
+    const Value* const found = extensionOf(primitive, "KHR_draco_mesh_compression");
+    if (found == nullptr) return std::nullopt;
+    const std::string pointer = at + "/extensions/KHR_draco_mesh_compression";
+    const auto here = [&] { return pointer; };
+    requireObject(*found, here);
+    index(*found, "bufferView", count("bufferViews"), "buffer view", here, true);
+    DracoPrimitive made{found->at("bufferView").get<int>(), {}};
+    const auto attributes = found->find("attributes");
+    if (attributes == found->end()) file.fail(pointer, "'attributes' is missing");
+    requireObject(*attributes, [&] { return pointer + "/attributes"; });
+    for (auto it = attributes->begin(); it != attributes->end(); ++it) {
+        const auto place = [&] { return fmt::format("{}/attributes/{}", pointer, it.key().substr(0, 60)); };
+        if (const std::uint64_t id = whole(*it, place); id > 0xffffffffu)
+            file.fail(place(), "there is no such attribute");
+        else
+            made.ids[it.key()] = static_cast<std::uint32_t>(id);
+    }
+    if (member(primitive, "mode", 4, [&] { return at; }) != 4)
+        file.fail(at + "/mode", "crt reads triangles (mode 4) of Draco and nothing else");
+    return made;
+}
+
 void GltfJson::checkPrimitive(const Value& primitive, const std::string& at) const {
-    const auto extensions = primitive.find("extensions");
-    if (extensions != primitive.end() && extensions->is_object() &&
-        extensions->contains("KHR_draco_mesh_compression"))
-        file.fail(at,
-                  "this mesh is compressed by Draco, which crt does not support; export it without mesh "
-                  "compression");
+    (void)dracoOf(primitive, at);
     const auto here = [&] { return at; };
     const auto attributes = primitive.find("attributes");
     if (attributes == primitive.end()) file.fail(at, "'attributes' is missing");

@@ -2,6 +2,7 @@
 /// nor that a value of the wrong kind was left out.
 #pragma once
 
+#include "scene/gltf/gltf_compression.h"
 #include "scene/gltf/gltf_file.h"
 
 #include <fmt/format.h>
@@ -11,6 +12,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 
 namespace crt {
@@ -104,6 +106,10 @@ struct GltfJson {
 
     /// Throws crt::Error(Scene) for what is of the wrong kind, or names what is not there.
     void check() const;
+
+    /// The compression of a buffer view or a primitive; nothing if it has none. `at` is its pointer.
+    std::optional<MeshoptView> meshoptOf(const Value& view, const std::string& at) const;
+    std::optional<DracoPrimitive> dracoOf(const Value& primitive, const std::string& at) const;
 
 private:
     void checkAsset() const;

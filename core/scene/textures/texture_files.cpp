@@ -1,5 +1,7 @@
 #include "scene/textures/texture_files.h"
 
+#include "base/byte_hash.h"
+#include "base/frame_cache.h"
 #include "base/log.h"
 #include "base/parallel.h"
 #include "spectra/sigmoid.h"
@@ -262,6 +264,38 @@ void encodeNormals(const Texels& texels, const std::string& path, std::span<std:
     }
 }
 
+/// The words of an image, the top row first.
+void decode(const ImageSource& source, const TexelUse& use, std::uint32_t width, std::uint32_t height,
+            std::span<std::uint16_t> words) {
+    const std::string& file = source.name;
+    const bool alpha = use.kind == TexelKind::Numbers && use.channel == kAlphaChannel;
+    Texels texels = alpha ? readAlpha(source) : readTexels(source);
+    if (texels.info.width != width || texels.info.height != height)
+        throw Error(ErrorKind::Scene,
+                    fmt::format("the image '{}' has changed since its header was read", file), {file});
+    if (use.kind == TexelKind::Spectra && texels.info.is_associated)
+        divideByAlpha(texels, readAlpha(source));
+    if (use.kind == TexelKind::Spectra)
+        encodeSpectra(texels, use, file, words);
+    else if (use.kind == TexelKind::Normals)
+        encodeNormals(texels, file, words);
+    else
+        encodeNumbers(texels, alpha ? 0 : use.channel, file, words);
+    if (use.kind == TexelKind::Numbers) change(use, words);
+}
+
+/// The content of an image: its digest where it lies in another file, else the file and its time.
+std::string contentOf(const ImageSource& source) {
+    if (source.bytes) {
+        ByteHash hash;
+        hash.add(source.bytes->data(), source.bytes->size());
+        return hash.digits128();
+    }
+    std::error_code unknown;
+    return fmt::format("{} {} {}", source.name, std::filesystem::file_size(source.name, unknown),
+                       std::filesystem::last_write_time(source.name, unknown).time_since_epoch().count());
+}
+
 }  // namespace
 
 std::array<std::uint16_t, 3> texelOf(const std::array<float, 3>& coefficients) {
@@ -336,21 +370,15 @@ std::shared_ptr<const TextureImage> TextureFiles::make(const ImageSource& source
     image->height = info.height;
     image->kind = use.kind;
     image->decode = [source, use, width = info.width, height = info.height](std::span<std::uint16_t> words) {
-        const std::string& file = source.name;
-        const bool alpha = use.kind == TexelKind::Numbers && use.channel == kAlphaChannel;
-        Texels texels = alpha ? readAlpha(source) : readTexels(source);
-        if (texels.info.width != width || texels.info.height != height)
-            throw Error(ErrorKind::Scene,
-                        fmt::format("the image '{}' has changed since its header was read", file), {file});
-        if (use.kind == TexelKind::Spectra && texels.info.is_associated)
-            divideByAlpha(texels, readAlpha(source));
-        if (use.kind == TexelKind::Spectra)
-            encodeSpectra(texels, use, file, words);
-        else if (use.kind == TexelKind::Normals)
-            encodeNormals(texels, file, words);
-        else
-            encodeNumbers(texels, alpha ? 0 : use.channel, file, words);
-        if (use.kind == TexelKind::Numbers) change(use, words);
+        if (!KeptFrames::wanted()) return decode(source, use, width, height, words);
+        static FrameCache<std::pair<std::string, TexelUse>, std::vector<std::uint16_t>> kept;
+        const auto made = kept.of([&] { return std::pair(contentOf(source), use); },
+                                  [&] {
+                                      std::vector<std::uint16_t> all(words.size());
+                                      decode(source, use, width, height, all);
+                                      return all;
+                                  });
+        std::copy(made->begin(), made->end(), words.begin());
     };
     return image;
 }

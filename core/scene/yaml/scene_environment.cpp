@@ -55,24 +55,30 @@ bool readImage(const SectionReader& section, SceneFiles& files, Environment& env
     return true;
 }
 
-bool readSky(const SectionReader& section, SpectrumReader& spectra, Environment& environment) {
-    CieSky sky;
+/// The keys that both kinds of sky have. False, with an error, when they are wrong.
+template <class Sky>
+bool readSunAndRows(const SectionReader& section, Sky& sky) {
     const std::size_t errors = section.diagnostics().count();
-    section.read("type", sky.type);
     if (section.read("rows", sky.rows) && sky.rows % 2 != 0)
         section.error("rows", "the horizon lies between two rows, so their number is even");
-    environment.radiance = illuminantSpectrum("D65").value();
-    if (std::optional<Spectrum> spectrum = spectra.read(section, "spectrum", SpectrumUse::Emission))
-        environment.radiance = *std::move(spectrum);
     const std::optional<Vec3d> sun = readTowardsSun(section, 0);
     Vec3d up{0, 1, 0};
     if (!sun || !readUp(section, up) || section.diagnostics().count() != errors) return false;
     sky.towards_sun = *sun;
-    if (!(dot(*sun, up) > 0)) {
-        section.error("direction", "the sun of this sky is below the horizon");
-        return false;
-    }
     sky.axes = axesAround(up, 0);
+    if (dot(*sun, up) > 0) return true;
+    section.error("direction", "the sun of this sky is below the horizon");
+    return false;
+}
+
+bool readSky(const SectionReader& section, SpectrumReader& spectra, Environment& environment) {
+    CieSky sky;
+    const std::size_t errors = section.diagnostics().count();
+    section.read("type", sky.type);
+    environment.radiance = illuminantSpectrum("D65").value();
+    if (std::optional<Spectrum> spectrum = spectra.read(section, "spectrum", SpectrumUse::Emission))
+        environment.radiance = *std::move(spectrum);
+    if (!readSunAndRows(section, sky) || section.diagnostics().count() != errors) return false;
     const double unit = photometric(environment.radiance);
     double amount = 0;
     sky.horizontal = section.read("horizontal_illuminance_lx", amount);
@@ -90,10 +96,57 @@ bool readSky(const SectionReader& section, SpectrumReader& spectra, Environment&
     return true;
 }
 
+/// The sun of a clear sky, as disks on each other that darken it towards its limb.
+void addSun(const SectionReader& section, const ClearSky& sky, const ClearSkyModel& model,
+            std::vector<PointLight>& lights) {
+    constexpr std::size_t kDisks = 8;
+    double scale = 1, diameter_deg = kSkySunDiameter_deg;
+    section.read("sun_scale", scale);
+    section.read("sun_diameter_deg", diameter_deg);
+    // A sun of another size has the same irradiance.
+    scale *= sunProjectedSolidAngle_sr(kSkySunDiameter_deg) / sunProjectedSolidAngle_sr(diameter_deg);
+    for (const SunDisk& disk : model.sunDisks(kDisks)) {
+        PointLight light;
+        light.name = fmt::format("the sun of the clear sky, disk {}", lights.size() + 1);
+        light.type = PointLightType::Sun;
+        light.place = section.place().resolved();
+        light.direction = sky.towards_sun * -1;
+        light.spectrum = skySpectrum(disk.radiance);
+        light.strength = scale;
+        light.angular_diameter_deg = diameter_deg * disk.diameter;
+        if (const double brightest = scale * light.spectrum.max(); brightest > kMostRadiance)
+            section.error("sun_scale",
+                          fmt::format("the radiance of this sun reaches {:g}, and radiance goes "
+                                      "up to {:g}",
+                                      brightest, kMostRadiance));
+        if (scale * light.spectrum.max() > 0) lights.push_back(std::move(light));
+    }
+}
+
+bool readClearSky(const SectionReader& section, SpectrumReader& spectra, Environment& environment,
+                  std::vector<PointLight>& lights) {
+    ClearSky sky;
+    const std::size_t errors = section.diagnostics().count();
+    section.read("turbidity", sky.turbidity);
+    section.read("scale", sky.scale);
+    Spectrum ground = constantSpectrum(kUsualGroundAlbedo);
+    if (std::optional<Spectrum> albedo = spectra.read(section, "ground_albedo", SpectrumUse::Reflectance))
+        ground = *std::move(albedo);
+    sky.ground_albedo = skyValues(ground);
+    if (!readSunAndRows(section, sky) || section.diagnostics().count() != errors) return false;
+    const ClearSkyModel model = sky.model();
+    SkyValues mean = model.horizontalIrradiance();
+    for (double& value : mean) value *= sky.scale / std::numbers::pi;
+    environment.radiance = skySpectrum(mean);
+    if (sky.scale > 0) environment.clear_sky = sky;
+    addSun(section, sky, model, lights);
+    return section.diagnostics().count() == errors;
+}
+
 }  // namespace
 
 std::optional<Environment> readEnvironment(const SectionReader& section, SpectrumReader& spectra,
-                                           SceneFiles& files) {
+                                           SceneFiles& files, std::vector<PointLight>& lights) {
     Environment environment;
     environment.light_sampling = true;
     if (section.has("image")) {
@@ -101,6 +154,9 @@ std::optional<Environment> readEnvironment(const SectionReader& section, Spectru
     } else if (section.has("sky")) {
         const std::optional<SectionReader> sky = section.section("sky", "the sky");
         if (!readSky(*sky, spectra, environment)) return std::nullopt;
+    } else if (section.has("clear_sky")) {
+        const std::optional<SectionReader> sky = section.section("clear_sky", "the clear sky");
+        if (!readClearSky(*sky, spectra, environment, lights)) return std::nullopt;
     } else {
         std::optional<Spectrum> radiance = spectra.read(section, "radiance", SpectrumUse::Emission);
         if (!radiance) return std::nullopt;

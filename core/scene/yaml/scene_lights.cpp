@@ -74,7 +74,7 @@ void readIes(const SectionReader& section, SceneFiles& files, PointLight& light)
     if (!path) return;
     files.note(*path);
     try {
-        auto profile = std::make_shared<IesProfile>(readIesFile(*path));
+        auto profile = std::make_shared<IesProfile>(readPhotometricFile(*path));
         if (luminousFlux_lm(*profile) > 0)
             light.ies = std::move(profile);
         else

@@ -209,6 +209,7 @@ const std::vector<std::string> kFilters{"box", "gaussian", "blackman-harris"};
 SectionSchema film() {
     const FilmSettings d;
     const std::vector<std::string> spaces{"srgb", "acescg", "xyz"};
+    const std::vector<std::string> views(kViewTransformNames.begin(), kViewTransformNames.end());
     return {"film",
             "film",
             "The image and how samples become its pixels.",
@@ -262,6 +263,14 @@ SectionSchema film() {
                  .fallback = yaml(d.apply_to_float),
                  .doc = "EXR and PFM get `white_balance` and `exposure_ev` too. Without it they hold the "
                         "radiance of the scene, in `color_space`."},
+                {.name = "view",
+                 .kind = Kind::Choice,
+                 .choices = views,
+                 .fallback = yaml(views, d.view),
+                 .doc = "The curve by which PNG, JPEG and PPM show what is brighter than white. "
+                        "`none` clips it. `filmic` is the curve of Narkowicz (2015), for each of red, "
+                        "green and blue. `agx` is AgX of Sobotka (2022) in the form of Wrensch (2023): "
+                        "bright colours turn white. EXR and PFM are never changed."},
                 {.name = "spectral",
                  .kind = Kind::Section,
                  .section = "spectral_film",
@@ -1121,6 +1130,10 @@ void addOutside(std::vector<SectionSchema>& all) {
            .doc = "The direction of the top of `image`. Its middle is towards −z, or +y where z is "
                   "up."},
           {.name = "sky", .kind = Kind::Section, .section = "sky", .doc = "A CIE standard general sky."},
+          {.name = "clear_sky",
+           .kind = Kind::Section,
+           .section = "clear_sky",
+           .doc = "A clear sky with the colours of its light, and its sun."},
           {.name = "light_sampling",
            .kind = Kind::Boolean,
            .doc = "Sample directions of the environment where surfaces scatter, too. This pays where "
@@ -1128,14 +1141,17 @@ void addOutside(std::vector<SectionSchema>& all) {
                   "error). Under an open sky it takes two to three times as long. crt chooses directions "
                   "of an image or a sky by brightness. The default is `true` with `image` or `sky`, else "
                   "`false`."}},
-         {{KeyRule::Kind::ExactlyOne, {"radiance", "image", "sky"}},
+         {{KeyRule::Kind::ExactlyOne, {"radiance", "image", "sky", "clear_sky"}},
           {KeyRule::Kind::AtMostOne, {"radiance", "scale"}},
           {KeyRule::Kind::AtMostOne, {"radiance", "rotation_deg"}},
           {KeyRule::Kind::AtMostOne, {"radiance", "up"}},
           {KeyRule::Kind::AtMostOne, {"sky", "scale"}},
           {KeyRule::Kind::AtMostOne, {"sky", "rotation_deg"}},
-          {KeyRule::Kind::AtMostOne, {"sky", "up"}}}});
-    addSky(all);
+          {KeyRule::Kind::AtMostOne, {"sky", "up"}},
+          {KeyRule::Kind::AtMostOne, {"clear_sky", "scale"}},
+          {KeyRule::Kind::AtMostOne, {"clear_sky", "rotation_deg"}},
+          {KeyRule::Kind::AtMostOne, {"clear_sky", "up"}}}});
+    addSkies(all);
     all.push_back({"output",
                    "an output",
                    "",

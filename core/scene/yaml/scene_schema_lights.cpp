@@ -2,6 +2,7 @@
 #include "scene/yaml/scene_schema_lights.h"
 
 #include "scene/cie_sky.h"
+#include "scene/clear_sky.h"
 #include "scene/scene.h"
 #include "scene/scene_limits.h"
 #include "scene/yaml/scene_schema_values.h"
@@ -139,7 +140,8 @@ void addLights(std::vector<SectionSchema>& all) {
           positionKey(),
           {.name = "file",
            .required = true,
-           .doc = "The IES file; looked up in the scene's folder, then in CRT_MESH_PATH."},
+           .doc = "The IES file, or a EULUMDAT file (.ldt); looked up in the scene's folder, then in "
+                  "CRT_MESH_PATH. C0 of EULUMDAT is the horizontal angle 0."},
           vectorKey("direction",
                     "Direction of the vertical angle 0: down, for a lamp that hangs as measured; "
                     "any length but 0. `[0, -1, 0]` when left out."),
@@ -216,8 +218,14 @@ void addLights(std::vector<SectionSchema>& all) {
                 noSpectrumBeside("radiance"))});
 }
 
-void addSky(std::vector<SectionSchema>& all) {
-    const CieSky d;
+void addSkies(std::vector<SectionSchema>& all) {
+    const auto rows = [](int fallback) {
+        return KeySchema{.name = "rows",
+                         .kind = Kind::Integer,
+                         .range = {2, 4096, false, false},
+                         .fallback = fmt::format("{}", fallback),
+                         .doc = "Of the image that the sky becomes at load, twice as wide; an even number."};
+    };
     all.push_back(
         {"sky", "a sky",
          "A CIE standard general sky (ISO 15469:2004, CIE S 011). It gives the luminance in each "
@@ -231,17 +239,49 @@ void addSky(std::vector<SectionSchema>& all) {
                                      .doc = "Of the standard's table: 1 overcast, 5 uniform, 7 partly "
                                             "cloudy, 12 clear, 13 clear and polluted, 15 hazy."},
                                     amountKey("zenith_luminance_cd_m2", "cd/m²",
-                                    "Luminance of the zenith."),
+                                              "Luminance of the zenith."),
                                     amountKey("horizontal_illuminance_lx", "lx",
                                               "Illuminance of level ground under the whole sky.")},
-             sunKeys(), spectrumKey(),
-             KeySchema{.name = "rows",
-                       .kind = Kind::Integer,
-                       .range = {2, 4096, false, false},
-                       .fallback = fmt::format("{}", d.rows),
-                       .doc = "Of the image that the sky becomes at load, twice as wide; an even number."}),
+             sunKeys(), spectrumKey(), rows(CieSky{}.rows)),
          joined(sunRules(), KeyRule{KeyRule::Kind::ExactlyOne,
                                     {"zenith_luminance_cd_m2", "horizontal_illuminance_lx"}})});
+    const auto number = [](const char* name, ValueRange range, const char* unit, double fallback,
+                           const char* doc) {
+        return KeySchema{.name = name,
+                         .kind = Kind::Number,
+                         .range = range,
+                         .unit = unit,
+                         .fallback = fmt::format("{}", fallback),
+                         .doc = doc};
+    };
+    const ClearSky d;
+    all.push_back(
+        {"clear_sky", "a clear sky",
+         "The clear sky of Hosek and Wilkie (2012, 2013) with its sun: spectral radiance in "
+         "W·m⁻²·sr⁻¹·nm⁻¹, "
+         "in absolute terms, by the place of the sun, the haze and the ground. The sun is darker towards "
+         "its "
+         "limb. The model has no night, no clouds and nothing below the horizon; its data end at 720 nm, "
+         "and "
+         "crt holds their last value. Each direction has the luminance of the model; its spectrum is "
+         "fitted, "
+         "to 3 % on average.",
+         joined(
+             std::vector<KeySchema>{
+                 number("turbidity", {kLeastTurbidity, kMostTurbidity, false, false}, "", d.turbidity,
+                        "Haze: 2 is a very clear sky, 3 clear, 6 a warm and moist day, 10 hazy."),
+                 {.name = "ground_albedo",
+                  .kind = Kind::Spectrum,
+                  .range = {0, 1, false, false},
+                  .fallback = fmt::format("{}", kUsualGroundAlbedo),
+                  .doc = "The reflectance of the ground all around, which brightens the sky."},
+                 number("scale", kNotNegative, "", d.scale, "Times the radiance of the sky."),
+                 number("sun_scale", kNotNegative, "", 1,
+                        "Times the radiance of the sun; 0 leaves the sun out."),
+                 number("sun_diameter_deg", {0.001, 90, false, false}, "degrees", kSkySunDiameter_deg,
+                        "The angular diameter of the sun, whose irradiance stays the same.")},
+             sunKeys(), rows(d.rows)),
+         sunRules()});
 }
 
 std::vector<KeySchema> sunKeys() {
@@ -271,6 +311,11 @@ std::vector<KeySchema> sunKeys() {
                   "length but 0."),
         {.name = "date", .doc = "As `2026-06-21`, from 1950 to 2050. A sun below the horizon is refused."},
         {.name = "time", .doc = "As `'14:30'` or `'14:30:00'`, in quotes."},
+        {.name = "time_h",
+         .kind = Kind::Number,
+         .range = {0, 24, false, true},
+         .unit = "hours",
+         .doc = "Or as a number: 14.5 is half past two in the afternoon."},
         offset,
         latitude,
         longitude,
@@ -281,7 +326,10 @@ std::vector<KeySchema> sunKeys() {
 std::vector<KeyRule> sunRules() {
     using Rule = KeyRule::Kind;
     return {{Rule::ExactlyOne, {"direction", "date"}},
-            {Rule::Together, {"date", "time", "latitude_deg", "longitude_deg"}},
+            {Rule::Together, {"date", "latitude_deg", "longitude_deg"}},
+            {Rule::AtMostOne, {"time", "time_h"}},
+            {Rule::AtMostOne, {"direction", "time"}},
+            {Rule::AtMostOne, {"direction", "time_h"}},
             {Rule::AtMostOne, {"direction", "utc_offset"}},
             {Rule::AtMostOne, {"direction", "north"}}};
 }

@@ -10,8 +10,8 @@ namespace crt {
 /// Adds the sections "light/…".
 void addLights(std::vector<SectionSchema>& all);
 
-/// Adds the section "sky".
-void addSky(std::vector<SectionSchema>& all);
+/// Adds the sections "sky" and "clear_sky".
+void addSkies(std::vector<SectionSchema>& all);
 
 /// The keys that readTowardsSun (scene_sun.h) reads, and what they have to do with each other.
 std::vector<KeySchema> sunKeys();

@@ -60,7 +60,12 @@ bool readDate(const SectionReader& section, Moment& when) {
 
 bool readTime(const SectionReader& section, Moment& when) {
     std::string text;
-    if (!section.read("time", text)) return false;
+    if (section.read("time_h", when.hours)) return true;
+    if (!section.read("time", text)) {
+        if (section.has("date") && !section.has("time") && !section.has("time_h"))
+            section.error("date", "a date needs a time of day: 'time' or 'time_h'");
+        return false;
+    }
     const std::optional<std::vector<int>> hms = numbersIn(text, 2, ':');
     if (!hms || hms->size() < 2 || hms->size() > 3 || (*hms)[0] > 23 || (*hms)[1] > 59 ||
         (hms->size() == 3 && (*hms)[2] > 59)) {
@@ -119,9 +124,9 @@ std::optional<Vec3d> readTowardsSun(const SectionReader& section, double diamete
     when.hours -= utc_offset_h;
     const SolarPosition sun = solarPosition(when, latitude_deg, longitude_deg);
     if (sun.elevation_deg <= -diameter_deg / 2) {
-        section.error(
-            "time", fmt::format("the sun is {:.1f} degrees below the horizon then", -sun.elevation_deg),
-            section.has("utc_offset") ? "" : "if 'time' is local time, add 'utc_offset' in hours");
+        section.error(section.has("time") ? "time" : "time_h",
+                      fmt::format("the sun is {:.1f} degrees below the horizon then", -sun.elevation_deg),
+                      section.has("utc_offset") ? "" : "if 'time' is local time, add 'utc_offset' in hours");
         return std::nullopt;
     }
     return towards(section, sun);

@@ -82,6 +82,7 @@ void readFilm(const SectionReader& section, SpectrumReader& spectra, FilmSetting
         section.error("white_balance", "this spectrum has no luminance, so it has no white");
     section.read("exposure_ev", film.exposure_ev);
     section.read("apply_to_float", film.apply_to_float);
+    section.readEnum("view", film.view);
     film.spectral = readSpectralFilm(section, spectra);
 }
 
@@ -237,7 +238,7 @@ void readScene(const YamlNode& root, Diagnostics& out, SceneFiles& files, GltfFi
         ObjectReader(out, materials, meshes, room, scene).read(*list);
     if (const YamlNode* list = top.list("lights")) readLights(*list, out, files, spectra, scene);
     if (const auto section = top.section("environment", "environment"))
-        scene.environment = readEnvironment(*section, spectra, files);
+        scene.environment = readEnvironment(*section, spectra, files, scene.point_lights);
     if (const YamlNode* list = top.list("outputs"))
         for (std::size_t i = 0; i < list->items.size(); ++i)
             readOutput(SectionReader(out, *list->items[i], list->items[i]->place, schemaSection("output"),

@@ -271,13 +271,14 @@ class Importer:
         self.one_environment(plugin, image | ({"scale": max(scale, 0)} if scale != 1 else {}))
 
     def one_environment(self, plugin, made):
-        if self.scene.environment is not None:
+        if self.scene.environment is None:
+            self.scene.environment = made
+        elif both := mitsuba_sky.together(self.scene.environment, made):
+            self.scene.environment = both
+        else:
             self.losses.add(plugin.place, "a second environment", "the first alone", large=True)
-            return
-        self.scene.environment = made
 
     def sky(self, plugin):
-        """CIE's clear sky and a sun, with the direction and the illuminance of Mitsuba's."""
         found = mitsuba_sky.Daylight(plugin, self.reader.version < (2, 0))
         if plugin.kind == "timed_sunsky":
             self.losses.add(plugin.place, f"{plugin}", "the sky of one time", large=True)
@@ -286,12 +287,11 @@ class Importer:
                             "horizon", large=True)
             plugin.left.clear()
             return
-        if sky := found.sky():
-            self.losses.add(plugin.place, f"the distribution of light over the sky of {plugin}",
-                            f"CIE standard sky {sky['type']} of the same illuminance")
-            self.one_environment(plugin, {"sky": sky})
-        if sun := found.sun():
-            self.scene.lights.append(sun)
+        albedo = self.values.reflectance(plugin, "albedo", 0.3)
+        if isinstance(albedo, dict) and {"texture", "checker", "attribute"} & set(albedo):
+            self.losses.add(plugin.place, f"a texture as 'albedo' of {plugin}", "0.3")
+            albedo = 0.3
+        self.one_environment(plugin, {"clear_sky": found.keys(albedo)})
 
     light_sunsky = light_sky = light_sun = light_timed_sunsky = sky
 

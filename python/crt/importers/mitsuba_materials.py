@@ -170,7 +170,9 @@ class Materials:
         if name == "none":
             return None
         base = name.partition("_")[0]
-        if base not in spectra.METALS:
+        if base in spectra.METAL_COLORS and base not in spectra.METALS:
+            self.losses.add(plugin.place, f"the metal '{name}'", spectra.OTHER_DATA)
+        elif base not in spectra.METALS:
             base = "Au" if base in YELLOW else "Cu" if base in RED else "Al"
             self.losses.add(plugin.place, f"the metal '{name}'", f"'{base}'")
         return {"metal": base}

@@ -1,14 +1,14 @@
-"""Mitsuba's plugins sunsky, sky and sun: where their sun stands and how bright they are."""
+"""Mitsuba's plugins sunsky, sky and sun, which have the model of crt's clear sky."""
 
 import datetime
 import math
 
 import numpy as np
 
-from . import matrices, sun_sky
+from . import matrices
 from .losses import refuse
 
-IGNORED = ("resolution", "stretch", "extend", "sun_rays", "sun_samples", "albedo", "complex_sun", "to_world",
+IGNORED = ("resolution", "stretch", "extend", "sun_rays", "sun_samples", "complex_sun", "to_world",
            "sampling_weight")
 
 
@@ -41,26 +41,51 @@ class Daylight:
                                             seconds=given["second"])
         except (ValueError, OverflowError) as error:
             refuse(self.plugin.place, f"{self.plugin} has no such date: {error}")
-        elevation, azimuth = sun_sky.position(when, given["latitude"], given["longitude"])
+        elevation, azimuth = position(when, given["latitude"], given["longitude"])
         level = math.cos(elevation)
         east, north = math.sin(azimuth) * level, math.cos(azimuth) * level
         # Older versions: x is east and z south. Later ones: x is south and y west.
         return np.array([east, math.sin(elevation), -north] if self.older else
                         [-north, -east, math.sin(elevation)])
 
-    def sky(self):
-        """The keys of crt's sky, or None where the plugin has none."""
-        scale = self.scale * max(self.plugin.number("sky_scale", 1), 0)
-        if self.plugin.kind == "sun" or scale == 0:
-            return None
-        return sun_sky.sky(self.turbidity, self.elevation_deg, scale) | {
-            "direction": -self.towards, "up": self.up}
-
-    def sun(self):
-        """The keys of crt's sun, or None where the plugin has none."""
-        scale = self.scale * max(self.plugin.number("sun_scale", 1), 0)
+    def keys(self, albedo):
+        """The keys of crt's clear sky, of the same model."""
+        made = {"turbidity": self.turbidity, "ground_albedo": albedo, "direction": -self.towards,
+                "up": self.up}
+        for key, name, without in (("scale", "sky_scale", "sun"), ("sun_scale", "sun_scale", "sky")):
+            made[key] = 0 if self.plugin.kind == without else \
+                self.scale * max(self.plugin.number(name, 1), 0)
         diameter = self.plugin.number("sun_aperture", 0.5358) * self.plugin.number("sun_radius_scale", 1)
-        if self.plugin.kind == "sky" or scale == 0:
-            return None
-        made = sun_sky.sun(self.turbidity, self.elevation_deg, scale, min(max(diameter, 0.001), 90.0))
-        return made | {"direction": -self.towards} if made["illuminance_lx"] > 0 else None
+        if diameter != 0.5358 and made["sun_scale"] > 0:
+            made["sun_diameter_deg"] = min(max(diameter, 0.001), 90.0)
+        return made
+
+
+def together(first, second):
+    """One clear sky of two, of which one is a sky alone and the other a sun alone; or None."""
+    if "clear_sky" not in first or "clear_sky" not in second:
+        return None
+    sky, sun = sorted((first["clear_sky"], second["clear_sky"]), key=lambda keys: keys["sun_scale"] > 0)
+    alone = sky["sun_scale"] == 0 and sun["scale"] == 0
+    of_sun = {key: sun[key] for key in ("direction", "sun_scale", "sun_diameter_deg") if key in sun}
+    return {"clear_sky": sky | of_sun} if alone else None
+
+
+def position(when, latitude_deg, longitude_deg):
+    """Elevation and azimuth of the sun in radians, the azimuth from north through east. `when` is Universal
+    Time. Source: the Astronomical Almanac's low precision formulas, 0.01 degrees from 1950 to 2050."""
+    days = (when - datetime.datetime(2000, 1, 1, 12)).total_seconds() / 86400
+    mean_longitude = 280.460 + 0.9856474 * days
+    anomaly = math.radians(357.528 + 0.9856003 * days)
+    longitude = math.radians(mean_longitude + 1.915 * math.sin(anomaly) + 0.020 * math.sin(2 * anomaly))
+    obliquity = math.radians(23.439 - 4e-7 * days)
+    ascension = math.atan2(math.cos(obliquity) * math.sin(longitude), math.cos(longitude))
+    declination = math.asin(math.sin(obliquity) * math.sin(longitude))
+    sidereal = math.radians(280.46062 + 360.985647 * days + longitude_deg)
+    hour_angle, latitude = sidereal - ascension, math.radians(latitude_deg)
+    elevation = math.asin(math.sin(latitude) * math.sin(declination)
+                          + math.cos(latitude) * math.cos(declination) * math.cos(hour_angle))
+    azimuth = math.atan2(-math.cos(declination) * math.sin(hour_angle),
+                         math.cos(latitude) * math.sin(declination)
+                         - math.sin(latitude) * math.cos(declination) * math.cos(hour_angle))
+    return elevation, azimuth

@@ -146,7 +146,7 @@ class Materials:
             return COPPER
         eta = self.values.unbounded(found, prefix + "eta", {"data": "metals/Cu/n"})
         k = self.values.unbounded(found, prefix + "k", {"data": "metals/Cu/k"})
-        for metal in spectra.METALS:
+        for metal in spectra.METAL_COLORS:
             if (eta, k) == ({"data": f"metals/{metal}/n"}, {"data": f"metals/{metal}/k"}):
                 return {"metal": metal}
         eta, changed = spectra.index_above_0(eta)

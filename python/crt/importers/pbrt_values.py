@@ -10,11 +10,10 @@ from .images import BYTES, IMAGES, pixels
 from .mitsuba_values import decoded
 from .pbrt_text import TYPES, only
 
-GLASSES = {"BK7": "N-BK7", "F10": "SF10", "F11": "SF11"}
+GLASSES = {"BK7": "N-BK7", "BAF10": "N-BAF10", "FK51A": "N-FK51A", "LASF9": "N-LASF9", "F10": "SF10",
+           "F11": "SF11"}
 # Indices at 587.6 nm and Abbe's numbers of the catalogue.
-OTHER_GLASSES = {"BAF10": (1.67003, 47.11), "FK51A": (1.48656, 84.47), "LASF9": (1.85025, 32.17),
-                 "F5": (1.67270, 32.21)}
-OTHER_METALS = {"CuZn": "Au", "MgO": "Al", "TiO2": "Al"}
+OTHER_GLASSES = {"F5": (1.67270, 32.21)}
 ILLUMINANTS = ("A", "D50", "D65", "F2", "F7", "F11")
 NEAREST_ILLUMINANT = {"stdillum-F1": "F7", "stdillum-F3": "F2", "stdillum-F4": "F2", "stdillum-F5": "F7",
                       "stdillum-F6": "F2", "stdillum-F8": "F7", "stdillum-F9": "F2", "stdillum-F10": "F11",
@@ -75,11 +74,12 @@ class Values:
         family, _, rest = name.partition("-")
         if family == "metal" and rest.rpartition("-")[2] in ("eta", "k"):
             metal, _, part = rest.rpartition("-")
-            if metal not in spectra.METALS:
-                found = OTHER_METALS.get(metal, "Al")
-                close = suggestion(metal, spectra.METALS)
-                self.losses.add(place, f"the metal '{metal}'{close}", f"'{found}'")
-                metal = found
+            if metal in spectra.METAL_COLORS and metal not in spectra.METALS:
+                self.losses.add(place, f"the metal '{metal}'", spectra.OTHER_DATA)
+            elif metal not in spectra.METALS:
+                close = suggestion(metal, spectra.METAL_COLORS)
+                self.losses.add(place, f"the metal '{metal}'{close}", "'Al'")
+                metal = "Al"
             return {"data": f"metals/{metal}/{'n' if part == 'eta' else 'k'}"}
         if family == "glass":
             if rest in GLASSES:

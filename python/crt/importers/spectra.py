@@ -17,10 +17,16 @@ EFFICIENCY = np.array([
 GRID_NM = np.arange(360, 831)
 GRID = np.interp(GRID_NM, EFFICIENCY_NM, EFFICIENCY)
 
-METALS = ("Ag", "Al", "Au", "Cu")
+METALS = ("Ag", "Al", "Au", "Cu")  # The same numbers as in pbrt and Mitsuba.
 # Reflectances straight on: means of 600 to 700, 500 to 570 and 430 to 480 nm of `crt data metals/…`.
 METAL_COLORS = {"Ag": [0.970, 0.956, 0.922], "Al": [0.912, 0.922, 0.924], "Au": [0.941, 0.751, 0.389],
-                "Cu": [0.929, 0.624, 0.556]}
+                "Cu": [0.929, 0.624, 0.556], "Ti": [0.615, 0.576, 0.547], "V": [0.528, 0.538, 0.563],
+                "Cr": [0.556, 0.556, 0.555], "Mn": [0.604, 0.572, 0.546], "Fe": [0.532, 0.512, 0.497],
+                "Co": [0.685, 0.652, 0.622], "Ni": [0.699, 0.635, 0.574], "Pd": [0.734, 0.693, 0.659],
+                "Zn": [0.738, 0.769, 0.768], "Mo": [0.600, 0.605, 0.601], "Nb": [0.504, 0.507, 0.503],
+                "Pt": [0.678, 0.635, 0.591], "Ir": [0.745, 0.729, 0.705], "Rh": [0.796, 0.763, 0.744],
+                "W": [0.516, 0.494, 0.471], "Hg": [0.782, 0.779, 0.779], "CuZn": [0.885, 0.752, 0.461]}
+OTHER_DATA = "its indices by another publication"
 
 
 def rgb(values, scale=1):
