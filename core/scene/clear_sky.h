@@ -35,8 +35,8 @@ public:
     /// data/sky/hosek_wilkie.txt, once. Throws crt::Error(Scene) where there is none, or it is broken.
     ClearSkyModel(double turbidity, const SkyValues& ground_albedo, double sun_elevation_rad);
 
-    /// W·m⁻²·sr⁻¹·nm⁻¹ of a direction, by the cosine of its angle with the zenith, its angle in radians
-    /// with the sun, and the cosine of that; 0 below the horizon.
+    /// Spectral radiance of a direction, by the cosine of its angle with the zenith, its angle with the
+    /// sun in radians, and the cosine of that; 0 below the horizon.
     SkyValues radiance(double cos_zenith, double to_sun_rad, double cos_to_sun) const;
     /// Irradiance of level ground by the sky alone, W·m⁻²·nm⁻¹.
     SkyValues horizontalIrradiance() const;
