@@ -214,6 +214,9 @@ TEST_CASE("a clear sky of a scene brings its sun", "[sky][yaml]") {
     CHECK_THAT(refused(here + "time_h: 12, time: '12:00'}}\n"), Contains("exclude each other"));
     CHECK_THAT(refused(here + "}}\n"), Contains("needs a time of day"));
     CHECK_THAT(refused(sky + ", turbidity: 11}}\n"), Contains("must be 1 to 10"));
+    CHECK_THAT(refused(sky + ", albedo: 1}}\n"), Contains("did you mean 'ground_albedo'?"));
+    CHECK_THAT(refused(sky + "}, light_linking: []}\n"), Contains("no light linking"));
+    CHECK_THAT(refused("environment: {sunsky: {}}\n"), Contains("'clear_sky'"));
     CHECK_THAT(refused(sky + ", rows: 33}}\n"), Contains("even"));
     CHECK_THAT(refused(sky + ", sun_scale: 1e30}}\n"), Contains("radiance goes up to"));
     CHECK_THAT(refused("environment: {clear_sky: {direction: [0, 1, 0]}}\n"), Contains("below the horizon"));

@@ -1,5 +1,6 @@
 #include "base/error.h"
 #include "cli/commands.h"
+#include "cli/denoiser.h"
 #include "cli/process/python.h"
 #include "cli/shared_options.h"
 
@@ -25,10 +26,12 @@ struct Request {
     bool bare = false;
 };
 
-int denoise(const Request& request) {
-    std::vector<std::string> words{"denoise", request.film};
-    for (const std::string& output : request.outputs) words.insert(words.end(), {"-o", output});
-    if (request.bare) words.emplace_back("--no-guides");
+}  // namespace
+
+void becomeDenoiser(const std::string& film, const std::vector<std::string>& outputs, bool bare) {
+    std::vector<std::string> words{"denoise", film};
+    for (const std::string& output : outputs) words.insert(words.end(), {"-o", output});
+    if (bare) words.emplace_back("--no-guides");
     becomePythonPackage(words);
     throw Error(ErrorKind::Usage,
                 pythonProgram().empty()
@@ -36,8 +39,6 @@ int denoise(const Request& request) {
                     : "denoising needs crt's Python package, and python3 has none: docs/install.md says how "
                       "to install it, with its extra 'denoise'; CRT_PYTHON names another Python");
 }
-
-}  // namespace
 
 Command denoiseCommand() {
     const auto request = std::make_shared<Request>();
@@ -60,7 +61,10 @@ Command denoiseCommand() {
                           .help = "do not use the film's albedo and normal",
                           .read = [request](const std::string&) { request->bare = true; }}}}},
             .notes = kDenoiseNotes,
-            .run = [request](const std::string&) { return denoise(*request); }};
+            .run = [request](const std::string&) -> int {
+                becomeDenoiser(request->film, request->outputs, request->bare);
+                return 0;
+            }};
 }
 
 }  // namespace crt

@@ -32,6 +32,7 @@ struct Files {
     std::string saved;               ///< The path that was finally written.
     std::string resume;              ///< Empty: start from nothing.
     std::string report;              ///< Empty: none.
+    std::vector<std::string> denoised;  ///< Of the images; empty: they are not denoised.
     FilmGuard films;                 ///< Files that exist in places where films will be written.
 };
 
@@ -60,8 +61,8 @@ Files planFiles(const Job& job, const Scene& scene) {
                        : !job.resume_file.empty()   ? job.resume_file
                                                   : besideOutput(files.outputs.first, kCheckpointExtension);
     files.checkpoint_wanted =
-        job.resume || !job.checkpoint_file.empty();  // A run that was resumed once is likely to be resumed
-                                                     // again.
+        // A run that was resumed once is likely to be resumed again.
+        job.resume || !job.checkpoint_file.empty() || job.denoise;
     if (job.resume) {
         files.resume = !job.resume_file.empty() ? job.resume_file : files.checkpoint;
         std::error_code unreadable;
@@ -79,7 +80,9 @@ Files planFiles(const Job& job, const Scene& scene) {
         files.resume = files.checkpoint;
     files.report = job.report_file ? *job.report_file : besideOutput(files.outputs.first, kReportExtension);
 
+    if (job.denoise) files.denoised = denoisedNames(imageNames(files.outputs));
     std::vector<std::string> written = imageNames(files.outputs), films = files.outputs.films;
+    written.insert(written.end(), files.denoised.begin(), files.denoised.end());
     if (!files.report.empty()) written.push_back(files.report);
     // The last; crt chose its name, unless it is also one of the others.
     films.push_back(files.checkpoint);
@@ -94,6 +97,7 @@ Files planFiles(const Job& job, const Scene& scene) {
     }
 
     for (const Output& image : files.outputs.images) checkWritable(image.file);
+    for (const std::string& image : files.denoised) checkWritable(image);
     for (const std::string& film : files.outputs.films) checkWritable(film);
     checkWritable(files.checkpoint);
     if (!files.report.empty()) checkWritable(files.report);
@@ -299,6 +303,7 @@ int runJob(const Job& job, Watch& watch) {
     if (facts.error) tellTarget(facts);
     if (!facts.outputs.empty()) logInfo("wrote {}", fmt::join(facts.outputs, ", "));
     if (failure.get()) throw *failure.get();
+    if (job.denoise && facts.exit_code == 0) job.denoise(files.saved, files.denoised);
     if (facts.stop == StopReason::Interrupted && run.film.samples.count() == 0)
         logInfo("stopped by {} before all pixels had a sample: there is no image", facts.request.cause);
     else if (facts.stop == StopReason::Interrupted)

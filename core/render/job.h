@@ -43,6 +43,9 @@ struct Job : RenderOptions {
     bool expose_automatically = false;       ///< By the film, instead of the scene's exposure.
     std::optional<std::string> report_file;  ///< Unset: beside the first output. Empty: none.
     std::string command;                     ///< As typed, for the report.
+    /// Gets the film, once all is written, and the names of the denoised images. Where it is set, the film
+    /// is kept. Empty: the images are not denoised.
+    std::function<void(const std::string& film, const std::vector<std::string>& denoised)> denoise{};
     std::string frame;                       ///< The request of a frame, for its report; else empty.
 };
 

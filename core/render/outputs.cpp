@@ -69,6 +69,19 @@ std::string besideOutput(const std::string& output, const char* suffix) {
     return std::filesystem::path(output).replace_extension().string() + suffix;
 }
 
+std::vector<std::string> denoisedNames(const std::vector<std::string>& images) {
+    std::vector<std::string> names;
+    for (const std::string& image : images) {
+        const std::filesystem::path path(image);
+        const std::string end = path.extension().string();
+        if (isStandardOutput(image) || (end != ".png" && end != ".exr")) continue;
+        names.push_back((path.parent_path() / (path.stem().string() + ".denoised" + end)).string());
+    }
+    if (names.empty())
+        throw Error(ErrorKind::Usage, "--denoise writes beside .png and .exr files, and there is none");
+    return names;
+}
+
 Image developedImage(const Output& output, const Film& film, const FilmIdentity& identity) {
     if (!identity.record) throw Error(ErrorKind::Internal, "a film without a record cannot be developed");
     const FilmRecord& record = *identity.record;

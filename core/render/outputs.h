@@ -30,6 +30,10 @@ OutputPlan planOutputs(const std::vector<std::string>& files, const Scene& scene
 /// "out/cornell.exr" → "out/cornell<suffix>".
 std::string besideOutput(const std::string& output, const char* suffix);
 
+/// "a.denoised.png" of "a.png": of the PNG and EXR files among `images`. Throws crt::Error(Usage) if there
+/// are none.
+std::vector<std::string> denoisedNames(const std::vector<std::string>& images);
+
 /// The image that `output` holds: the film developed for its format, with everything that its identity knows
 /// as metadata. The identity must have a record. Throws crt::Error(Usage) for an AOV that the film lacks.
 Image developedImage(const Output& output, const Film& film, const FilmIdentity& identity);

@@ -1,6 +1,8 @@
 """Open Image Denoise: nearer to the converged image, of the same energy, and never in the place of what was
 measured."""
 
+import os
+import subprocess
 import sys
 
 import numpy as np
@@ -138,3 +140,20 @@ def test_the_command_guesses_beside_the_film(oidn, tmp_path, capfd):
     assert (tmp_path / "a.crtfilm").read_bytes() == before
     assert main(["denoise", str(tmp_path / "a.crtfilm"), "-o", str(tmp_path / "a.crtfilm")]) != 0
     assert (tmp_path / "a.crtfilm").read_bytes() == before
+
+
+def test_a_render_is_denoised_on_request(oidn, tmp_path):
+    (tmp_path / "box.yaml").write_text(BOX)
+
+    def render(*more):
+        return subprocess.run([sys.executable, "-m", "crt", "box.yaml", "--spp", "4", *more], cwd=tmp_path,
+                              capture_output=True, text=True, timeout=600,
+                              env={**os.environ, "CRT_PYTHON": sys.executable})
+    done = render("-o", "a.png", "-o", "b.exr", "-o", "c.pfm", "--denoise")
+    assert done.returncode == 0, done.stderr
+    for name in ("a.png", "b.exr", "c.pfm", "a.crtfilm", "a.denoised.png", "b.denoised.exr"):
+        assert (tmp_path / name).exists(), name
+    assert "crt/denoised" not in crt.pictures.texts((tmp_path / "a.png").read_bytes())
+    assert "crt/denoised" in crt.pictures.texts((tmp_path / "a.denoised.png").read_bytes())
+    done = render("-o", "only.pfm", "--denoise")
+    assert done.returncode == 2 and "there is none" in done.stderr and not (tmp_path / "only.pfm").exists()

@@ -65,6 +65,17 @@ const std::vector<ForeignWords>& foreignWords() {
         {{"light"},
          {"environment", "envmap", "infinite", "hdri", "dome", "sky"},
          "light from all around is the scene's 'environment'"},
+        {{"light"}, {"eulumdat", "ldt", "photometric"}, "type 'ies' reads EULUMDAT files, too"},
+        {{"environment"},
+         {"sun_sky", "sunsky", "hosek_wilkie", "preetham", "nishita", "daylight", "turbidity"},
+         "a clear sky and its sun are 'clear_sky'"},
+        {{"sky"}, {"turbidity"}, "a sky by its turbidity is 'clear_sky' of the environment"},
+        {{"clear_sky"}, {"albedo"}, "did you mean 'ground_albedo'?"},
+        {{"object", "emission", "environment", "light/point", "light/spot", "light/ies", "light/beam",
+          "light/directional", "light/sun"},
+         {"light_linking", "shadow_linking", "linked_lights", "include_lights", "exclude_lights",
+          "include_objects", "exclude_objects"},
+         "crt has no light linking: every light reaches every surface that it sees"},
     };
     return all;
 }
