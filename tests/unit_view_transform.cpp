@@ -1,5 +1,6 @@
 // View transforms of display formats: published points of their curves, and what each of them must keep.
 #include "catch.h"
+#include "image/development.h"
 #include "image/srgb_encoding.h"
 #include "image/view_transform.h"
 

@@ -42,7 +42,8 @@ Command renderCommand() {
                            .help = "scene file (YAML), or - for standard input",
                            .read = [&job](const std::string& text) { job.scene.file = text; },
                            .completion = completeScene()}},
-            .groups = {samplesGroup(job), deviceGroup(job), std::move(files), messagesGroup(state->progress)},
+            .groups = {samplesGroup(job), deviceGroup(job), std::move(files),
+                       messagesGroup(state->progress)},
             .notes = programExamples(),
             .run = [state](const std::string& typed) {
                 state->job.command = typed;

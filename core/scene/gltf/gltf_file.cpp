@@ -169,6 +169,19 @@ void GltfFile::checkText() const {
     }
 }
 
+/// Remembers how a primitive is compressed, and which accessors are thus decoded.
+void GltfFile::keepDraco(const GltfJson& json, const nlohmann::json& primitive, std::size_t mesh,
+                         std::size_t number) {
+    auto how = json.dracoOf(primitive, fmt::format("/meshes/{}/primitives/{}", mesh, number));
+    if (!how) return;
+    if (primitive.contains("indices")) draco_accessors_[primitive["indices"].get<int>()] = {mesh, number};
+    const Value& attributes = primitive["attributes"];
+    for (const auto& [name, id] : how->ids)
+        if (const auto found = attributes.find(name); found != attributes.end())
+            draco_accessors_[found->get<int>()] = {mesh, number};
+    draco_[{mesh, number}] = *std::move(how);
+}
+
 void GltfFile::check(const GltfJson& json) {
     json.check();
     const auto text = [](const Value& object, const char* key) {
@@ -189,9 +202,7 @@ void GltfFile::check(const GltfJson& json) {
     const Value& meshes = json.list("meshes");
     for (std::size_t i = 0; i < meshes.size(); ++i)
         for (std::size_t k = 0; k < meshes[i]["primitives"].size(); ++k)
-            if (auto how =
-                    json.dracoOf(meshes[i]["primitives"][k], fmt::format("/meshes/{}/primitives/{}", i, k)))
-                draco_[{i, k}] = *std::move(how);
+            keepDraco(json, meshes[i]["primitives"][k], i, k);
     animations_ = json.list("animations").size();
     const Value& images = json.list("images");
     for (std::size_t i = 0; i < images.size(); ++i) {
@@ -384,7 +395,11 @@ void GltfFile::decodePrimitive(std::size_t mesh, std::size_t primitive) {
             });
 }
 
-const DracoValues* GltfFile::decoded(int accessor) const {
+const DracoValues* GltfFile::decoded(int accessor) {
+    const auto primitive = draco_accessors_.find(accessor);
+    if (primitive == draco_accessors_.end()) return nullptr;
+    const auto [mesh, number] = primitive->second;
+    decodePrimitive(mesh, number);
     const auto found = decoded_.find(accessor);
     return found == decoded_.end() ? nullptr : &found->second;
 }

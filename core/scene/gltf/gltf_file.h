@@ -4,6 +4,8 @@
 
 #include "scene/gltf/gltf_compression.h"
 
+#include <nlohmann/json_fwd.hpp>
+
 #include <cstddef>
 #include <cstdint>
 #include <map>
@@ -45,10 +47,9 @@ public:
     /// names the view, for messages. Throws crt::Error(Scene).
     std::string_view view(int buffer_view, const std::string& pointer);
 
-    /// Decodes a primitive that Draco compressed; does nothing for others. Throws crt::Error(Scene).
-    void decodePrimitive(std::size_t mesh, std::size_t primitive);
-    /// The elements of an accessor that decodePrimitive() decoded; null where they are in its buffer view.
-    const DracoValues* decoded(int accessor) const;
+    /// The elements of an accessor of a primitive that Draco compressed, which is decoded when one of them is
+    /// first asked for; null for all others. Throws crt::Error(Scene).
+    const DracoValues* decoded(int accessor);
 
     /// An image: a file beside this one, or bytes in it.
     struct Image {
@@ -81,10 +82,13 @@ private:
     void split();
     void checkText() const;
     void check(const GltfJson& json);
+    void keepDraco(const GltfJson& json, const nlohmann::json& primitive, std::size_t mesh,
+                   std::size_t number);
     std::string_view buffer(std::size_t index);
     std::string_view bytesOf(std::size_t buffer, std::uint64_t offset, std::uint64_t length,
                              const std::string& pointer);
     std::string_view decompressed(std::size_t buffer_view, const MeshoptView& how);
+    void decodePrimitive(std::size_t mesh, std::size_t primitive);
     /// The path of a file that a URI names.
     std::string pathOf(const std::string& uri, const std::string& pointer) const;
     std::optional<std::string> dataOf(const std::string& uri, const std::string& pointer) const;
@@ -97,6 +101,7 @@ private:
     std::map<std::size_t, MeshoptView> meshopt_;  ///< By buffer view.
     std::map<std::size_t, std::string> decompressed_;
     std::map<std::pair<std::size_t, std::size_t>, DracoPrimitive> draco_;  ///< By mesh and primitive.
+    std::map<int, std::pair<std::size_t, std::size_t>> draco_accessors_;  ///< To their primitive.
     std::map<int, DracoValues> decoded_;                                   ///< By accessor.
     std::size_t animations_ = 0;
     std::vector<std::string> files_read_;

@@ -115,7 +115,6 @@ const tinygltf::Primitive& primitiveOf(GltfFile& file, std::size_t mesh, std::si
         file.fail(fmt::format("/meshes/{}/primitives", mesh),
                   fmt::format("there is no primitive {}: the mesh has {}, counted from 0", primitive,
                               primitives.size()));
-    file.decodePrimitive(mesh, primitive);
     return primitives[primitive];
 }
 
