@@ -49,6 +49,33 @@ TEST_CASE("a key that is set takes the place of those that exclude it", "[overri
               .environment->sky->type == 5);
 }
 
+// Fails when a name with a dot is cut, or a number that is also a name is not an index.
+TEST_CASE("items of lists are found by index and by name", "[override]") {
+    const auto object = [](const std::string& name) {
+        return fmt::format("  - {{name: {}, sphere: {{radius: 1}}, material: m}}\n", name);
+    };
+    const std::string body =
+        "materials: {m: {type: diffuse, reflectance: 0}, n: {type: mirror, reflectance: 1}}\n"
+        "objects:\n" +
+        object("helmet") + object("helmet.001") + object("'1'") + object("the lamp");
+    const auto changed = [&](const std::string& path) {
+        const Scene scene = with(body, {path + ".material=n"});
+        std::string text;
+        for (const crt::Object& o : scene.objects)
+            text += o.material == scene.objects[0].material ? 'a' : 'b';
+        return text;
+    };
+    CHECK(changed("objects.helmet.001") == "abaa");
+    CHECK(changed("objects.the lamp") == "aaab");
+    CHECK(changed("objects.1") == "abaa");
+    CHECK(changed("objects.helmet") == "abbb");  // The first, to which the others are compared.
+    CHECK_THAT(
+        refusedOverride(body, "objects.helmt.material=n"),
+        Contains("from 0 to 3 or an item's name, found 'helmt'") && Contains("did you mean 'helmet'?"));
+    CHECK_THAT(refusedOverride(body + object("helmet"), "objects.helmet.material=n"),
+               Contains("2 items are called 'helmet'") && Contains("0, 4"));
+}
+
 TEST_CASE("a spectrum of one kind becomes one of another kind", "[override]") {
     const std::string body =
         "spectra: {s: {table: {nm: [400, 700], value: [1, 1]}, outside: clamp, scale: 2}}\n"

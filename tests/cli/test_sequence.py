@@ -99,7 +99,7 @@ class Sequences(CliTest):
 class Light(LightTest):
     def test_a_frame_of_a_lean_sequence_is_that_of_a_render(self):
         self.crt("sequence", "scene.yaml", "--frames", "0:3", "--spp", "4", "-b", self.backend,
-                 "-o", "f.pfm", "--set", "objects.1.emission.radiance={blackbody: 3000, scale: 1+frame}")
+                 "-o", "f.pfm", "--set", "objects.lamp.emission.radiance={blackbody: 3000, scale: 1+frame}")
         self.crt("scene.yaml", "--spp", "4", "-b", self.backend, "-o", "alone.pfm",
                  "--set", "objects.1.emission.radiance={blackbody: 3000, scale: 3}")
         self.assertEqual(read_bytes(self.path("f.0002.pfm")), read_bytes(self.path("alone.pfm")))

@@ -204,9 +204,9 @@ outputs:
   to the working directory.
 - All errors of a file are reported at once, each with its line, and crt ends with code 3. Spectra and
   materials that nothing uses are warnings.
-- `--set film.resolution=[128,128]` or `--set objects.0.material=red` changes a value before the scene is
-  checked. Lists go by index, from 0. A key that is set replaces the keys that exclude it:
-  `--set camera.fov=50` replaces a `focal_length` with its `sensor`. `null` removes an optional key:
+- `--set film.resolution=[128,128]` or `--set objects.ball.material=red` changes a value before the scene is
+  checked. Items of lists go by index, from 0, or by `name`. A key that is set replaces the keys that exclude
+  it: `--set camera.fov=50` replaces a `focal_length` with its `sensor`. `null` removes an optional key:
   `--set objects.1.emission=null` switches a light off.
 - Editors that know JSON Schema check scenes while you type: save `crt schema` as `crt-scene-1.schema.json`
   and begin the scene with `# yaml-language-server: $schema=crt-scene-1.schema.json`.

@@ -136,19 +136,59 @@ private:
         std::erase_if(map.entries, [&keys](const YamlEntry& entry) { return keys.contains(entry.key); });
     }
 
-    void applyToList(YamlNode& list, const YamlNodePtr& value, std::size_t at, Row row) {
-        const std::size_t length = std::min(path_.find('.', at), path_.size()) - at;
-        const Parsed<std::uint64_t> index = parseUnsigned(path_.substr(at, length));
-        if (!index.value || *index.value >= list.items.size()) {
-            const std::string list_name = path_.substr(0, at > 0 ? at - 1 : 0);
-            out_.error(place(at, length),
-                       list.items.empty()
-                           ? fmt::format("'{}' is an empty list", list_name)
-                           : fmt::format("'{}' is a list; expected an index from 0 to {}, found '{}'",
-                                         list_name, list.items.size() - 1, path_.substr(at, length)));
-            return;
+    static std::string nameOf(const YamlNode& item) {
+        const YamlEntry* const name = item.kind == YamlKind::Map ? item.find("name") : nullptr;
+        return name != nullptr && name->value->kind == YamlKind::Scalar ? name->value->text : std::string();
+    }
+
+    /// The items of a list whose name the path goes on with, as far as the longest name does. `length` gets
+    /// how long that is.
+    std::vector<std::size_t> itemsNamed(const YamlNode& list, std::size_t at, std::size_t& length) const {
+        const std::string_view rest = std::string_view(path_).substr(at);
+        std::vector<std::size_t> found;
+        std::size_t longest = 0;
+        for (std::size_t i = 0; i < list.items.size(); ++i) {
+            const std::string name = nameOf(*list.items[i]);
+            const bool fits = !name.empty() && rest.starts_with(name) &&
+                              (rest.size() == name.size() || rest[name.size()] == '.');
+            if (!fits || name.size() < longest) continue;
+            if (name.size() > longest) found.clear();
+            longest = name.size();
+            found.push_back(i);
         }
-        YamlNodePtr& item = list.items[*index.value];
+        if (longest > 0) length = longest;
+        return found;
+    }
+
+    void refuseItem(const YamlNode& list, std::size_t at, std::size_t length) {
+        const std::string list_name = path_.substr(0, at > 0 ? at - 1 : 0), part = path_.substr(at, length);
+        if (list.items.empty())
+            return out_.error(place(at, length), fmt::format("'{}' is an empty list", list_name));
+        std::vector<std::string> names;
+        for (const YamlNodePtr& item : list.items)
+            if (std::string name = nameOf(*item); !name.empty()) names.push_back(std::move(name));
+        out_.error(place(at, length),
+                   fmt::format("'{}' is a list; expected an index from 0 to {}{}, found '{}'", list_name,
+                               list.items.size() - 1, names.empty() ? "" : " or an item's name", part),
+                   didYouMean(part, names));
+    }
+
+    /// By its index, or by the name that an item has.
+    void applyToList(YamlNode& list, const YamlNodePtr& value, std::size_t at, Row row) {
+        std::size_t length = std::min(path_.find('.', at), path_.size()) - at;
+        const Parsed<std::uint64_t> index = parseUnsigned(path_.substr(at, length));
+        std::vector<std::size_t> which;
+        if (index.value && *index.value < list.items.size())
+            which = {*index.value};
+        else
+            which = itemsNamed(list, at, length);
+        if (which.empty()) return refuseItem(list, at, length);
+        if (which.size() > 1)
+            return out_.error(
+                place(at, length),
+                fmt::format("{} items are called '{}'", which.size(), path_.substr(at, length)),
+                fmt::format("write the index of one: {}", fmt::join(which, ", ")));
+        YamlNodePtr& item = list.items[which.front()];
         if (at + length == path_.size())
             item = value;
         else
