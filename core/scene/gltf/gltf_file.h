@@ -47,8 +47,8 @@ public:
     /// names the view, for messages. Throws crt::Error(Scene).
     std::string_view view(int buffer_view, const std::string& pointer);
 
-    /// The elements of an accessor of a primitive that Draco compressed; null for all others. The primitive is
-    /// decoded when one of its accessors is first asked for. Throws crt::Error(Scene).
+    /// The elements of an accessor of a primitive that Draco compressed; null for all others. Decodes the
+    /// primitive when one of its accessors is first asked for. Throws crt::Error(Scene).
     const DracoValues* decoded(int accessor);
 
     /// An image: a file beside this one, or bytes in it.
