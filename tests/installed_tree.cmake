@@ -57,7 +57,7 @@ else()
       math(EXPR bytes "${bytes} + ${size}")
     endif()
   endforeach()
-  set(limit 14680064)  # 14 MiB, of both archives
+  set(limit 17825792)  # 17 MiB, of both archives; decoders of Draco and meshopt and muParser are 1.9 of them
   if(bytes GREATER limit)
     message(FATAL_ERROR
       "crt-portable has ${bytes} bytes unpacked, meshes and Embree aside: more than ${limit}")
