@@ -170,7 +170,8 @@ std::vector<std::array<std::uint32_t, 3>> trianglesOf(const Sheet& sheet) {
     return turned(triangles);
 }
 
-std::string dracoBytes(const Sheet& sheet, bool edgebreaker, std::array<int, 3>& ids) {
+std::string dracoBytes(const Sheet& sheet, bool edgebreaker, std::array<int, 3>& ids,
+                       bool with_truth_values = false) {
     draco::Mesh mesh;
     mesh.SetNumFaces(sheet.corners.size() / 3);
     mesh.set_num_points(static_cast<std::uint32_t>(sheet.count()));
@@ -192,6 +193,15 @@ std::string dracoBytes(const Sheet& sheet, bool edgebreaker, std::array<int, 3>&
            add(draco::GeometryAttribute::NORMAL, sheet.normals),
            add(draco::GeometryAttribute::TEX_COORD, sheet.uvs)};
     for (int& id : ids) id = static_cast<int>(mesh.attribute(id)->unique_id());
+    if (with_truth_values) {  // In the place of texture coordinates.
+        draco::GeometryAttribute form;
+        form.Init(draco::GeometryAttribute::GENERIC, nullptr, 2, draco::DT_BOOL, false, 2, 0);
+        const int id = mesh.AddAttribute(form, true, static_cast<std::uint32_t>(sheet.count()));
+        const std::array<bool, 2> both{true, false};
+        for (std::uint32_t i = 0; i < sheet.count(); ++i)
+            mesh.attribute(id)->SetAttributeValue(draco::AttributeValueIndex(i), both.data());
+        ids[2] = static_cast<int>(mesh.attribute(id)->unique_id());
+    }
     draco::ExpertEncoder encoder(mesh);
     encoder.SetEncodingMethod(edgebreaker ? draco::MESH_EDGEBREAKER_ENCODING
                                           : draco::MESH_SEQUENTIAL_ENCODING);
@@ -200,12 +210,12 @@ std::string dracoBytes(const Sheet& sheet, bool edgebreaker, std::array<int, 3>&
     return {buffer.data(), buffer.size()};
 }
 
-GltfMaker dracoFile(bool edgebreaker) {
+GltfMaker dracoFile(bool edgebreaker, bool with_truth_values = false) {
     const Sheet sheet;
     GltfMaker maker;
     maker.root["extensionsRequired"] = {"KHR_draco_mesh_compression"};
     std::array<int, 3> ids{};
-    const int view = maker.view(dracoBytes(sheet, edgebreaker, ids));
+    const int view = maker.view(dracoBytes(sheet, edgebreaker, ids, with_truth_values));
     const auto accessor = [&](int component, const char* type, std::size_t count) {
         return maker.add("accessors", {{"componentType", component}, {"type", type}, {"count", count}});
     };
@@ -307,6 +317,7 @@ TEST_CASE("compressed meshes that are damaged or wrong are refused with their pl
     CHECK_THAT(
         refusedDraco([&](GltfMaker&, Json& p) { p["extensions"][name]["attributes"]["NORMAL"] = 99; }),
         Contains("/accessors/1") && Contains("no NORMAL"));
+    CHECK_THAT(refusalOf(dracoFile(false, true)), Contains("/accessors/2") && Contains("no TEXCOORD_0"));
     CHECK_THAT(refusedDraco([](GltfMaker& m, Json&) { m.root["accessors"][0]["count"] = 9; }),
                Contains("/accessors/0/count"));
     CHECK_THAT(refusedDraco([](GltfMaker& m, Json&) { m.root["accessors"][3]["componentType"] = 5121; }),

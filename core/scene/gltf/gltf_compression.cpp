@@ -122,8 +122,10 @@ DracoValues DracoMesh::corners(int component_type) const {
 
 DracoValues DracoMesh::attribute(std::uint32_t id, int component_type, std::size_t components) const {
     const draco::PointAttribute* const attribute = state_->mesh->GetAttributeByUniqueId(id);
+    // glTF has no truth values, and Draco takes any byte of a file for one.
     if (attribute == nullptr || components == 0 || components > kMostComponents ||
-        attribute->num_components() != static_cast<int>(components))
+        attribute->num_components() != static_cast<int>(components) ||
+        attribute->data_type() == draco::DT_BOOL)
         return {};
     const std::uint32_t points = state_->mesh->num_points();
     DracoValues made{points, {}};
